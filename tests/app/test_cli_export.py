@@ -106,7 +106,7 @@ def of_arm(name, **changes):
     ],
 )
 def test_a_load_for_another_maker_s_arm_is_said_to_be_one(export, name, to):
-    assert f"identified on a {name}" in export(of_arm(name), "--to", to)[1]
+    assert f"identified on {name}: " in export(of_arm(name), "--to", to)[1]
     assert "identified on" not in export(of_arm(name), "--to", "urdf")[1]
 
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from armload.app.cli import main
 from armload.arms import arm
 from armload.devices.ros2.trajectory_file import read_path
 from armload.errors import MotionError
 from armload.excitation import Constraints, Criterion, PayloadRange, Surroundings, enrich, problems
-from armload.motion import PathMotion, load_motion, save_motion
+from armload.motion import PathMotion, export_motion, load_motion, save_motion
 from armload.motion.point_to_point import PointToPoint
 
 READY = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
@@ -131,3 +132,117 @@ def test_points_that_make_no_path_are_refused(changed):
     }
     with pytest.raises(MotionError):
         PathMotion(**(points | changed))
+
+
+HOME = np.array([0.0, -1.6, 1.4, -1.4, -1.57, 0.0])
+
+
+def cubic(arm, start, step, file, *, at=0.0):
+    """What a planner writes with velocities alone: its acceleration jumps, so that its jerk is large for a moment."""
+    points = []
+    for k, (share, speed) in enumerate([(0.0, 0.0), (0.15, 0.35), (0.5, 0.5), (0.85, 0.35), (1.0, 0.0)]):
+        when = round((at + 0.6 * k) * 1e9)
+        points.append(
+            {
+                "positions": (start + share * step).tolist(),
+                "velocities": (speed * step).tolist(),
+                "time_from_start": {"sec": when // 10**9, "nanosec": when % 10**9},
+            }
+        )
+    file.write_text(json.dumps({"joint_names": arm.joint_names, "points": points}))
+    return file
+
+
+@pytest.mark.parametrize(("millimetres", "degrees"), [(5.0, 0.0), (0.0, 2.0)])
+def test_no_millimetre_or_no_degree_asked_for_is_none_that_matters(panda, path, allowed, millimetres, degrees):
+    found = enrich(path, allowed, Criterion(panda, "same"), distance=1e-3 * millimetres, angle=np.deg2rad(degrees))
+    assert found.distance <= max(1e-3 * millimetres, 1e-5)
+    assert found.angle <= np.deg2rad(max(degrees, 0.01))
+    t = np.linspace(0.0, path.duration, 900)
+    (_, p), (_, r) = panda.frame_pose(path(t)[0]), panda.frame_pose(found.motion(t)[0])
+    assert np.linalg.norm(p - r, axis=1).max() <= 1.001 * max(1e-3 * millimetres, 1e-5)
+
+
+@pytest.mark.parametrize(("first", "last", "where"), [(0.5, 2.2, "begin"), (0.2, 0.8, "end")])
+def test_a_path_that_begins_or_ends_while_it_moves_is_refused(panda, path, first, last, where):
+    t = np.linspace(first, last, 100)
+    cut = PathMotion(t - first, *(path.derivative(t, order) for order in range(3)), name="cut")
+    about = Constraints(panda, cut(np.zeros(1))[0][0], share=1.0, payload=PayloadRange(2.0), travel=10.0, speed=5.0)
+    with pytest.raises(MotionError, match=rf"'cut' does not {where} at rest: panda_joint1 moves at 0\.\d+ rad/s"):
+        enrich(cut, about, Criterion(panda, "same"))
+
+
+def test_a_path_may_jump_in_acceleration_where_the_maker_sets_no_limit(tmp_path):
+    """UR's controllers take such paths every day; a limit that is only assumed forbids none."""
+    ur = arm("ur10e")
+    path = read_path(cubic(ur, HOME, np.array([0.6, 0.2, -0.3, 0.2, 0.1, 0.5]), tmp_path / "p.json"), ur)
+    about = Constraints(ur, HOME, share=1.0, payload=PayloadRange(3.0), travel=1e3, speed=1e3)
+    assert any(
+        "jerk" in text and "what is assumed, as its maker gives no limit" in text for text in problems(about, path)
+    )
+    found = enrich(path, about, Criterion(ur, "same"))
+    assert np.all(found.after < 1.02 * found.before)
+    assert found.after.sum() < 0.8 * found.before.sum()
+    speed = np.abs(found.motion.velocity(np.linspace(0.0, path.duration, 500))).max(axis=0)
+    assert np.all(speed < ur.limits.velocity)
+
+
+def test_a_maker_s_limit_that_a_path_passes_is_named_with_what_can_be_done(panda, path, allowed):
+    known = Criterion(panda, "same")
+    fast = PathMotion.of(path, 100.0)
+    fast = PathMotion(0.3 * fast.times, fast.positions, fast.velocities / 0.3, fast.accelerations / 0.09, "fast")
+    with pytest.raises(MotionError, match=r"of its limit\); change the path$"):
+        enrich(fast, allowed, known)
+    with pytest.raises(MotionError, match="change the path, or allow a higher --speed"):
+        enrich(path, replace(allowed, speed=0.1), known)
+    with pytest.raises(MotionError, match="change the path, or allow a larger --travel"):
+        enrich(path, replace(allowed, travel=0.1), known)
+
+
+@pytest.mark.parametrize("begins", [0.0, 2.5])
+def test_an_enriched_trajectory_is_due_when_its_path_was(tmp_path, capsys, begins):
+    ur = arm("ur10e")
+    file = cubic(ur, HOME, np.array([0.6, 0.2, -0.3, 0.2, 0.1, 0.5]), tmp_path / "p.json", at=begins)
+    out = tmp_path / "o.yaml"
+    assert main(["motion", "enrich", str(file), "--robot", "ur10e", "--payload", "3", "--out", str(out)]) == 0
+    assert "the first point is due" not in capsys.readouterr().err
+    enriched = read_path(out, ur)
+    assert enriched.begins == begins
+    assert enriched.duration == pytest.approx(2.4)
+
+
+def test_of_a_path_without_such_a_time_the_way_to_the_start_is_said(path, tmp_path, capsys):
+    save_motion(tmp_path / "m.json", PathMotion.of(path, 100.0))
+    out = tmp_path / "o.yaml"
+    words = ["motion", "enrich", str(tmp_path / "m.json"), "--robot", "panda", "--payload", "2", "--out", str(out)]
+    assert main(words) == 0
+    assert "the first point is due after 5 s" in capsys.readouterr().err
+    assert read_path(out, arm("panda")).begins == 5.0
+
+
+def test_a_program_for_ur_robots_of_another_arm_is_refused_before_anything_is_computed(path, tmp_path, capsys):
+    save_motion(tmp_path / "m.json", PathMotion.of(path, 100.0))
+    words = ["motion", "enrich", str(tmp_path / "m.json"), "--robot", "panda", "--out", str(tmp_path / "o.script")]
+    assert main(words) == 2
+    assert "which have 6 joints: panda has 7" in capsys.readouterr().err
+
+
+def test_a_path_whose_times_are_in_milliseconds_is_asked_about_at_once(panda, allowed):
+    rows = np.array([READY, READY + 0.1, READY])
+    slow = PathMotion(np.array([0.0, 2000.0, 4000.0]), rows, np.zeros((3, 7)), np.zeros((3, 7)), "slow")
+    with pytest.raises(MotionError, match=r"'slow' takes 4000 s, and no joint goes faster than 9.*are these ms\?"):
+        enrich(slow, allowed, Criterion(panda, "same"))
+
+
+def test_a_table_with_semicolons_is_told_what_parts_columns(panda, tmp_path):
+    (tmp_path / "p.csv").write_text("t;q1;q2;q3;q4;q5;q6;q7\n0;0;0;0;0;0;0;0\n")
+    with pytest.raises(MotionError, match="in s and rad, parted by commas"):
+        read_path(str(tmp_path / "p.csv"), panda)
+
+
+@pytest.mark.parametrize("form", ["p.json", "p.yaml"])
+def test_a_trajectory_where_a_motion_is_expected_is_called_one(panda, path, tmp_path, form):
+    cubic(panda, READY, np.full(7, 0.1), tmp_path / "p.json")
+    export_motion(path, tmp_path / "p.yaml", "ros2", joint_names=panda.joint_names)
+    with pytest.raises(MotionError, match="it is a JointTrajectory, for controllers"):
+        load_motion(tmp_path / form)

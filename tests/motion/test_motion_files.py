@@ -92,7 +92,7 @@ def test_a_motions_name_cannot_break_out_of_its_comment(tmp_path, ur_motion):
         ({"rate": float("nan")}, "positive"),
         ({"format": "ros2"}, "joint_names"),
         ({"format": "ros2", "joint_names": ["a"]}, "1 joint names for a motion of 7"),
-        ({"format": "ros2", "joint_names": list("abcdefg"), "lead": 0.0}, "lead"),
+        ({"format": "ros2", "joint_names": list("abcdefg"), "lead": -1.0}, "lead"),
         ({"format": "ur"}, "a UR robot has 6"),
     ],
 )

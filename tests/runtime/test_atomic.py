@@ -1,5 +1,6 @@
 """A file is there whole or not at all, and a writer that was killed leaves nothing that stays."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -130,3 +131,12 @@ def test_a_link_in_the_place_of_the_temporary_file_is_not_followed(tmp_path):
     with replacing(path) as part:
         part.write_text("newer")
     assert (path.read_text(), other.read_text()) == ("newer", "another's")
+
+
+@pytest.mark.parametrize("why", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG])
+def test_a_full_disk_is_an_error_of_the_file_that_was_wanted(tmp_path, why):
+    """A write that fails names no file by itself."""
+    path = tmp_path / "a.json"
+    with pytest.raises(OSError, match=r"space|exceeded|large") as caught, replacing(path):
+        raise OSError(why, os.strerror(why))
+    assert caught.value.filename == str(path)

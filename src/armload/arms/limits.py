@@ -12,7 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 @dataclass(frozen=True)
 class Limits:
-    """What the joints may do; each an array (n,). Acceleration and jerk are infinite where the maker gives none."""
+    """What the joints may do; each an array (n,). Acceleration and jerk are infinite where the maker gives none.
+
+    slides: which joints slide along an axis: m and N take the place of rad and N·m.
+    """
 
     position_low: NDArray[np.float64]  # [rad]
     position_high: NDArray[np.float64]  # [rad]
@@ -20,10 +23,11 @@ class Limits:
     effort: NDArray[np.float64]  # [N·m]
     acceleration: NDArray[np.float64]  # [rad/s²]
     jerk: NDArray[np.float64]  # [rad/s³]
+    slides: NDArray[np.bool_]
 
     @property
     def middle(self) -> NDArray[np.float64]:
-        """The middle of each joint's range (n,) [rad]; 0 where it has no limits."""
+        """The middle of each joint's range (n,) [rad, m]; 0 where it has no limits."""
         middle = 0.5 * (self.position_low + self.position_high)
         return np.where(np.isfinite(middle), middle, 0.0)
 
@@ -37,7 +41,8 @@ class Limits:
             return bool(np.all((self.position_low <= pose) & (pose <= self.position_high)))
 
         pose = np.asarray(q, dtype=float)
-        return "; positions are in rad: are these degrees?" if not within(pose) and within(np.deg2rad(pose)) else ""
+        turned = np.where(self.slides, pose, np.deg2rad(pose))
+        return "; positions are in rad: are these degrees?" if not within(pose) and within(turned) else ""
 
     @classmethod
     def of(cls, model: pin.Model, acceleration: Sequence[float] | None, jerk: Sequence[float] | None) -> Limits:
@@ -52,4 +57,5 @@ class Limits:
             np.where(model.upperEffortLimit > 0, model.upperEffortLimit, np.inf),
             endless if acceleration is None else np.array(acceleration[:n]),
             endless if jerk is None else np.array(jerk[:n]),
+            np.array([joint.shortname().startswith("JointModelP") for joint in list(model.joints)[1 : n + 1]]),
         )

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
+from armload.arms.units import heading, unit_of
 from armload.errors import MotionError
 from armload.excitation.payload_range import PayloadRange
 from armload.excitation.surroundings import Surroundings
@@ -23,6 +24,7 @@ from armload.motion.random_fourier import filled_limits
 SHARE = 0.8  # of each limit, as the shipped excitation keeps to
 TRAVEL = 1.0  # [rad] the farthest a joint goes from the start, as of the shipped excitation
 TOOL_SPEED = 1.5  # [m/s] of the payload frame: Franka's Cartesian limit is 1.7, a UR's safety setting 1.5
+_MAY_BE_ASSUMED = ("acceleration", "jerk")
 SHORTEST, LONGEST = 0.2, 60.0  # [s] of a designed motion
 
 
@@ -31,7 +33,8 @@ class Constraints:
     """What a motion from `start` (n,) [rad] and back must keep to.
 
     joints: (n,) which of them may move. share: of each limit. travel [rad]; speed: of the payload frame [m/s].
-    payload: what may be mounted. surroundings: floor, boxes, what is held.
+    payload: what may be mounted. surroundings: floor, boxes, what is held. path_uses: by quantity ("acceleration",
+    "jerk"), what a path uses by itself (n,): where the maker gives no limit, that and the assumed one are allowed.
 
     Raises:
         MotionError: a number out of range, or a start that the constraints forbid, with the limit that stands in the
@@ -46,16 +49,18 @@ class Constraints:
     travel: float = TRAVEL
     speed: float = TOOL_SPEED
     joints: NDArray[np.bool_] | None = None
+    path_uses: dict[str, NDArray[np.float64]] | None = None
 
     def __post_init__(self) -> None:
         arm, n = self.arm, self.arm.n
         start = np.array(self.start, dtype=float)
         if start.shape == (n,) and not np.all(np.isfinite(start)):
             j = int(np.argmin(np.isfinite(start)))
-            raise MotionError(f"the start has {start[j]} at {arm.joint_names[j]}: expected a finite position in rad")
+            raise MotionError(f"the start has {start[j]} at {arm.joint_names[j]}: expected a finite position")
         if start.shape != (n,):
             raise MotionError(
-                f"the start has {start.size} joint positions: {arm.name} has {n} joints; give {n} finite numbers in rad"
+                f"the start has {start.size} joint positions: {arm.name} has {n} joints; give {n} finite numbers: "
+                f"{heading('position', arm.limits.slides)}"
             )
         for name, value, most in (("share", self.share, 1.0), ("travel", self.travel, np.inf)):
             if not (np.isfinite(value) and 0 < value <= most):
@@ -91,10 +96,31 @@ class Constraints:
         filled = filled_limits(self.arm.limits)
         return {
             "velocity": self.share * filled.velocity,
-            "acceleration": self.share * filled.acceleration,
-            "jerk": self.share * filled.jerk,
+            "acceleration": self._beside_path("acceleration", self.share * filled.acceleration),
+            "jerk": self._beside_path("jerk", self.share * filled.jerk),
             "torque": self.share * self.arm.limits.effort,
         }
+
+    def whose(self, what: str) -> list[str]:
+        """Of each joint, what a limit is a share of, in words: its own limit, or one that is assumed."""
+        if what not in _MAY_BE_ASSUMED:
+            return ["its limit"] * self.arm.n
+        assumed = "what is assumed, as its maker gives no limit"
+        given = np.isfinite(getattr(self.arm.limits, what))
+        wider = self._wider(what, self.share * getattr(filled_limits(self.arm.limits), what))
+        return [
+            "its limit" if limit else f"{assumed}, beside what the path itself uses" if more else assumed
+            for limit, more in zip(given, wider, strict=True)
+        ]
+
+    def _wider(self, what: str, most: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Of which joints (n,) an assumed limit is less than what the path uses by itself."""
+        if self.path_uses is None:
+            return np.zeros(self.arm.n, bool)
+        return ~np.isfinite(getattr(self.arm.limits, what)) & (self.path_uses[what] > most)
+
+    def _beside_path(self, what: str, most: NDArray[np.float64]) -> NDArray[np.float64]:
+        return most if self.path_uses is None else np.where(self._wider(what, most), self.path_uses[what] + most, most)
 
     @cached_property
     def corners(self) -> NDArray[np.float64]:
@@ -129,10 +155,11 @@ class Constraints:
         for j in np.flatnonzero((self.start < low) | (self.start > high)):
             limits = arm.limits
             middle = (limits.position_low[j] + limits.position_high[j]) / 2
+            unit = unit_of("position", limits.slides[j])
             needed = abs(self.start[j] - middle) / (limits.position_high[j] - middle)
             raise MotionError(
-                f"{arm.joint_names[j]} starts at {self.start[j]:.4g} rad, outside {self.share:g} of its range about "
-                f"the middle, {low[j]:.4g} to {high[j]:.4g} rad (its limits are {limits.position_low[j]:.4g} and "
+                f"{arm.joint_names[j]} starts at {self.start[j]:.4g} {unit}, outside {self.share:g} of its range about "
+                f"the middle, {low[j]:.4g} to {high[j]:.4g} {unit} (its limits are {limits.position_low[j]:.4g} and "
                 f"{limits.position_high[j]:.4g}): start elsewhere{_or_share(needed)}"
                 f"{limits.as_degrees(self.start)}"
             )
@@ -141,10 +168,11 @@ class Constraints:
         over = np.abs(held).max(axis=0) - self.most["torque"]
         j = int(np.argmax(over / np.where(np.isfinite(self.most["torque"]), self.most["torque"], 1.0)))
         if over[j] >= 0.0:
+            unit = unit_of("torque", arm.limits.slides[j])
             needed = float((np.abs(held).max(axis=0) / arm.limits.effort).max())
             raise MotionError(
-                f"at the start {arm.joint_names[j]} needs {np.abs(held[:, j]).max():.4g} N·m to hold the worst "
-                f"payload of the range (up to {payload.mass:g} kg), more than {self.most['torque'][j]:.4g} N·m, "
+                f"at the start {arm.joint_names[j]} needs {np.abs(held[:, j]).max():.4g} {unit} to hold the worst "
+                f"payload of the range (up to {payload.mass:g} kg), more than {self.most['torque'][j]:.4g} {unit}, "
                 f"{self.share:g} of its limit: start elsewhere{_or_share(needed)}, or give the payload's mass "
                 f"({self._holds(bare, each)})"
             )

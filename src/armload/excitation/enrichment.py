@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.arms.units import unit_of
 from armload.errors import MotionError
 from armload.excitation.constraints import Constraints
 from armload.excitation.criterion import Criterion
@@ -30,12 +31,18 @@ DISTANCE, ANGLE = 5e-3, np.deg2rad(2.0)  # [m], [rad] at the payload frame
 _POINTS_PER_SECOND = 6.0  # control points: changes so small tell by their acceleration, up to about 3 Hz
 _SHORTEST = 0.5  # [s] of a stretch that is changed
 _STILL = 1e-3  # [rad/s] of the fastest joint: the path stands
+_FAR = 0.05  # [rad] that a path goes, which hence does not stand
 _STAGES = ((10, 50.0), (14, 1000.0))  # iterations of L-BFGS and weight of the penalty
 _RATE = 25.0  # [Hz] of the samples while it is looked for, four for each control point
+_ANY = 100.0  # [rad] of --travel: no bound
 _REACH = 0.03  # [rad] that a control point is scaled by
 _POINTS = 100.0  # [Hz] of the path that is handed out
 _SHRINKS, _SHRINK = 40, 0.95
 _INSIDE = 0.999
+# no change at all, of which 0 is asked: what no robot repeats. Motion that costs nothing at the flange does so to
+# first order alone
+_NO_DISTANCE, _NO_ANGLE = 1e-5, np.deg2rad(0.01)  # [m], [rad]
+_MOVING_AT_ENDS = 0.01  # of the velocity limit: less may be noise of a recorded path, or rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +76,7 @@ def enrich(
         path: from rest to rest.
         constraints: about the path's start; their clearances are kept as far as the path itself keeps them.
         criterion: what is known besides the run; its tare is no motion of its own.
-        distance, angle: of the payload frame at most [m, rad].
+        distance, angle: of the payload frame at most [m, rad]; 0: none that matters, 0.01 mm or 0.01°.
         seed: of the start; the same seed gives the same path.
 
     Raises:
@@ -79,12 +86,16 @@ def enrich(
     if path.n != arm.n:
         raise MotionError(f"the path {path.name!r} moves {path.n} joints: {arm.name} has {arm.n}")
     if not (distance >= 0 and angle >= 0 and distance + angle > 0):
-        raise MotionError(f"a change of {distance} m and {angle} rad is asked for: expected room in one of them")
+        asked = f"{1e3 * distance:g} mm and {np.rad2deg(angle):g}°"
+        raise MotionError(f"a change of {asked} is asked for: expected room in one of them")
+    distance, angle = max(distance, _NO_DISTANCE), max(angle, _NO_ANGLE)
+    _check_at_rest(constraints, path)
+    _check_pace(path)
     constraints = _as_the_path(constraints, path)
     passed = [one for one in used(constraints, path) if one.share > 1.0 and one.what != "rest"]
     if passed:
         raise MotionError(
-            f"the path {path.name!r} passes a limit by itself: {passed[0].text}; allow more, or change it"
+            f"the path {path.name!r} passes a limit by itself: {passed[0].text}; {_way_out(constraints, passed[0])}"
         )
     stretches = moving_stretches(path)
     if not stretches:
@@ -133,11 +144,59 @@ def moving_stretches(path: Motion) -> list[tuple[float, float, int]]:
     return out
 
 
+def _check_at_rest(constraints: Constraints, path: Motion) -> None:
+    """See that a path begins and ends at rest: an arm cannot jump into one that moves."""
+    arm, most = constraints.arm, constraints.most["velocity"] / constraints.share
+    for at, where in ((0.0, "begin"), (path.duration, "end")):
+        speed = np.abs(path.velocity([at])[0])
+        j = int(np.argmax(speed / most))
+        if speed[j] > _MOVING_AT_ENDS * most[j]:
+            raise MotionError(
+                f"the path {path.name!r} does not {where} at rest: {arm.joint_names[j]} moves at {speed[j]:.3g} "
+                f"{unit_of('velocity', arm.limits.slides[j])}; expected a path from rest to rest"
+            )
+
+
+def _check_pace(path: Motion) -> None:
+    """See that a path that goes anywhere does so in seconds: one of hours would be looked at 1000 times a second."""
+    fastest = float(np.abs(path.velocity(path.instants(200.0))).max())
+    if fastest <= _STILL and float(np.ptp(_poses(path), axis=0).max()) > _FAR:
+        raise MotionError(
+            f"the path {path.name!r} takes {path.duration:g} s, and no joint goes faster than {fastest:.2g} rad/s: "
+            "times are in s; are these ms?"
+        )
+
+
+def _way_out(constraints: Constraints, passed: Used) -> str:
+    """What may be done about a limit that a path passes: only a limit of the user's own can be made wider."""
+    ways = ["change the path"]
+    if passed.what == "torque":
+        ways.append("give the payload's mass (--payload)")
+    own = {"tool speed": "allow a higher --speed", "position": "allow a larger --travel"}
+    if passed.what in own and (passed.what == "tool speed" or constraints.travel < _ANY):
+        ways.append(own[passed.what])
+    if constraints.share < 1.0 and passed.what not in ("tool speed", "clearance"):
+        ways.append("allow a larger --share")
+    return ", or ".join(ways)
+
+
 def _as_the_path(constraints: Constraints, path: Motion) -> Constraints:
-    """The constraints, with clearances no larger than the path's own."""
+    """The constraints, with clearances no larger than the path's own.
+
+    An acceleration or a jerk to which the maker sets no limit is allowed as far as the path itself uses it, with what
+    is assumed of such an arm on top: a task's path that runs every day may jump in its acceleration.
+    """
     own = constraints.around.clearance(_poses(path)).min(axis=0)
     keep = np.minimum(constraints.around.keep, np.where(np.isfinite(own), own - 1e-3, np.inf))
-    return replace(constraints, surroundings=replace(constraints.around, keep=tuple(keep.tolist())))
+    steps = max(4, int(np.ceil(path.duration * RATE)))
+    t = np.linspace(0.0, path.duration, steps + 1)
+    both = [motion.position(t) for motion in (path, PathMotion.of(path, _POINTS))]  # as it is, and as it is handed out
+    own = {
+        what: np.max([np.abs(np.diff(q, k, axis=0)).max(axis=0) for q in both], axis=0) / t[1] ** k
+        for what, k in (("acceleration", 2), ("jerk", 3))
+    }
+    around = replace(constraints.around, keep=tuple(keep.tolist()))
+    return replace(constraints, surroundings=around, path_uses=own)
 
 
 def _held_back(
@@ -148,7 +207,7 @@ def _held_back(
     for _ in range(_SHRINKS):
         changed = PathMotion.of(_Changed(track, c, path.name), _POINTS, f"{path.name}-enriched")
         far, turned = (float(x.max()) for x in away(given, poses(constraints.arm, changed, RATE)))
-        over = max(far / distance if distance > 0 else 0.0, turned / angle if angle > 0 else 0.0)
+        over = max(far / distance, turned / angle)
         if over > _INSIDE:
             c = c * min(_SHRINK, _INSIDE / over)
             continue

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import payload_regressor
+from armload.arms.units import called, unit_of
 from armload.excitation.constraints import Constraints
 from armload.motion import Motion
-from armload.motion.check import QUANTITIES
 
 RATE = 1000.0  # [Hz]
 _EXACT = 1e-9  # of a limit, or [rad]: rounding
@@ -74,7 +74,9 @@ def problems(constraints: Constraints, motion: Motion) -> list[str]:
 
 def _positions(constraints: Constraints, t: NDArray, q: NDArray) -> list[Used]:
     out, start = [], constraints.start
+    slides = constraints.arm.limits.slides
     for j, name in enumerate(constraints.arm.joint_names):
+        unit = unit_of("position", slides[j])
         below, above = start[j] - constraints.low[j], constraints.high[j] - start[j]
         over = np.maximum(
             (q[:, j] - start[j]) / max(above, _EXACT),
@@ -82,8 +84,8 @@ def _positions(constraints: Constraints, t: NDArray, q: NDArray) -> list[Used]:
         )
         k = int(over.argmax())
         text = (
-            f"{name} goes to {q[k, j]:.4g} rad at t = {t[k]:.2f} s, {constraints.low[j]:.4g} to "
-            f"{constraints.high[j]:.4g} rad are allowed"
+            f"{name} goes to {q[k, j]:.4g} {unit} at t = {t[k]:.2f} s, {constraints.low[j]:.4g} to "
+            f"{constraints.high[j]:.4g} {unit} are allowed"
         )
         share = float(over[k]) if abs(q[k, j] - start[j]) > _EXACT else 0.0
         out.append(Used("position", name, share, float(t[k]), text))
@@ -91,13 +93,13 @@ def _positions(constraints: Constraints, t: NDArray, q: NDArray) -> list[Used]:
 
 
 def _joints(constraints: Constraints, what: str, t: NDArray, x: NDArray) -> list[Used]:
-    out, most = [], constraints.most[what]
+    out, most, whose, slides = [], constraints.most[what], constraints.whose(what), constraints.arm.limits.slides
     for j, name in enumerate(constraints.arm.joint_names):
         k = int(np.abs(x[:, j]).argmax())
-        size, unit = abs(float(x[k, j])), QUANTITIES[what]
+        size, unit = abs(float(x[k, j])), unit_of(what, slides[j])
         text = (
-            f"{name} has {what} {size:.4g} {unit} at t = {t[k]:.2f} s, {most[j]:.4g} {unit} are allowed"
-            f" ({constraints.share:g} of its limit)"
+            f"{name} has {called(what, slides[j])} {size:.4g} {unit} at t = {t[k]:.2f} s, "
+            f"{most[j]:.4g} {unit} are allowed ({constraints.share:g} of {whose[j]})"
         )
         out.append(Used(what, name, size / float(most[j]), float(t[k]), text))
     return out

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
+from armload.arms.units import heading, marked, unit_of
 from armload.devices.mover import AT_START
 from armload.errors import SafetyError
 from armload.excitation import Obstacle, PayloadRange, Surroundings
@@ -21,6 +22,7 @@ APPROACH = 1.0
 SHARES = (0.2, 0.1, 0.05)  # of the limits of velocity, acceleration and jerk that a straight way uses, fastest first
 _SAMPLES = 1000.0  # [Hz] at which a plan is checked, as fast as the fastest controller takes commands
 _CLEARANCES = 100.0  # [Hz] at which clearances are: at 2 m/s the tool goes 2 cm in between
+_SHOWN = (("position", "from"), ("position", "to"), ("velocity", "fastest"))  # columns of a plan
 _TOO_MANY = 100_000  # samples of a check
 
 
@@ -85,24 +87,28 @@ class Plan:
                 )
 
     def __str__(self) -> str:
+        slides = self.arm.limits.slides
         lines = [f"{self.arm.name} will move for {self.duration:.1f} s:"]
         for k, leg in enumerate(self.legs, start=1):
             q = leg.motion.position(leg.motion.instants(100.0))
             far = np.ptp(q, axis=0)
             j = int(np.argmax(far))
             lines.append(
-                f"{k}. {leg.purpose}: {leg.motion.name}, {leg.motion.duration:.1f} s, at most {far[j]:.2f} rad "
-                f"({self.arm.joint_names[j]})"
+                f"{k}. {leg.purpose}: {leg.motion.name}, {leg.motion.duration:.1f} s, at most {far[j]:.2f} "
+                f"{unit_of('position', slides[j])} ({self.arm.joint_names[j]})"
             )
-        width = max(len("joint"), *map(len, self.arm.joint_names))
-        lines.append(f"{'joint':<{width}}{'from [rad]':>12}{'to [rad]':>12}{'fastest [rad/s]':>17}{'of its limit':>14}")
+        joints = [marked(joint, slides, j) for j, joint in enumerate(self.arm.joint_names)]
+        width = max(len("joint"), *map(len, joints))
+        where, to, fast = (heading(what, slides, name) for what, name in _SHOWN)
+        wide, wider = (max(least, len(head) + 2) for least, head in ((12, where), (17, fast)))
+        lines.append(f"{'joint':<{width}}{where:>{wide}}{to:>{wide}}{fast:>{wider}}{'of its limit':>14}")
         every = [leg.motion(leg.motion.instants(200.0)) for leg in self.legs]
         q, dq = (np.concatenate([each[k] for each in every]) for k in (0, 1))
         fastest, limit = np.abs(dq).max(axis=0), self.arm.limits.velocity
-        for j, joint in enumerate(self.arm.joint_names):
+        for j, joint in enumerate(joints):
             share = f"{100 * fastest[j] / limit[j]:.0f} %" if np.isfinite(limit[j]) else "no limit"
             low, high = q[:, j].min(), q[:, j].max()
-            lines.append(f"{joint:<{width}}{low:>12.2f}{high:>12.2f}{fastest[j]:>17.2f}{share:>14}")
+            lines.append(f"{joint:<{width}}{low:>{wide}.2f}{high:>{wide}.2f}{fastest[j]:>{wider}.2f}{share:>14}")
         low, high = self.tool
         box = ", ".join(f"{a} from {x:.2f} to {y:.2f}" for a, x, y in zip("xyz", low, high, strict=True))
         lines.append(f"{self.arm.frame} stays within {box} m of the base, at most {self.speed:.2f} m/s")
@@ -170,9 +176,10 @@ def plan_of(
         if np.max(away) > AT_START:
             j = int(np.argmax(away))
             if away[j] > room.approach:
+                unit = unit_of("position", arm.limits.slides[j])
                 raise SafetyError(
-                    f"{arm.joint_names[j]} is {away[j]:.2f} rad from where {way.name} begins, more than the "
-                    f"{room.approach:g} rad of --approach: move the arm nearer to {np.round(start, 2).tolist()}, "
+                    f"{arm.joint_names[j]} is {away[j]:.2f} {unit} from where {way.name} begins, more than the "
+                    f"{room.approach:g} {unit} of --approach: move the arm nearer to {np.round(start, 2).tolist()}, "
                     "or allow more"
                 )
             legs.append(_way(check, here, start, TO_START if not legs else BACK))

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import PAYLOAD_REACH, Arm
+from armload.arms.units import QUANTITIES, called, heading, marked, unit_of
 from armload.errors import MotionError
 from armload.inertia import InertialParameters
 from armload.motion.collision import PAYLOAD_RADIUS, CapsuleArm, capsule_arm
 from armload.motion.motion import Motion
 
-QUANTITIES = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s²", "jerk": "rad/s³", "torque": "N·m"}
 _EQUAL = 1e-9  # [m] clearances that differ by rounding only: the first instant counts
 _AT_REST = 1e-3  # share of the velocity or acceleration limit that still counts as starting and ending at rest
 
@@ -27,6 +27,7 @@ class MotionCheck:
     margin: by quantity, what is left to the nearest limit (n,); infinite where the arm has no such limit.
     floor_clearance, self_clearance: smallest distances [m]; `floor_nearest`, `self_nearest` say of what and when.
     problems: one sentence for each limit that is passed, with the joint and the time; empty when the arm may run it.
+    slides: which joints (n,) slide along an axis: m and N take the place of rad and N·m.
     """
 
     arm: str
@@ -40,6 +41,7 @@ class MotionCheck:
     floor_nearest: str
     self_nearest: str
     problems: list[str]
+    slides: NDArray[np.bool_]
 
     @property
     def ok(self) -> bool:
@@ -51,13 +53,16 @@ class MotionCheck:
         return self.peak[quantity] / (self.peak[quantity] + self.margin[quantity])
 
     def __str__(self) -> str:
-        width = max(len("joint"), *map(len, self.joint_names))
+        joints = [marked(joint, self.slides, j) for j, joint in enumerate(self.joint_names)]
+        width = max(len("joint"), *map(len, joints))
+        heads = [heading(what, self.slides) for what in QUANTITIES]
+        wide = max(23, *(len(head) + 2 for head in heads))
         lines = [
             f"motion {self.motion} on {self.arm}, {self.duration:g} s: margin to each limit (share of the limit used)",
-            f"{'joint':<{width}}" + "".join(f"{f'{name} [{unit}]':>23}" for name, unit in QUANTITIES.items()),
+            f"{'joint':<{width}}" + "".join(f"{head:>{wide}}" for head in heads),
         ]
-        for i, joint in enumerate(self.joint_names):
-            lines.append(f"{joint:<{width}}" + "".join(f"{self._cell(name, i):>23}" for name in QUANTITIES))
+        for i, joint in enumerate(joints):
+            lines.append(f"{joint:<{width}}" + "".join(f"{self._cell(name, i):>{wide}}" for name in QUANTITIES))
         lines.append(_clearance("floor", self.floor_clearance, self.floor_nearest))
         lines.append(_clearance("itself", self.self_clearance, self.self_nearest))
         lines.append("the arm may run it" if self.ok else "the arm must NOT run it:")
@@ -115,19 +120,20 @@ def check_motion(
     room = np.minimum(q - limits.position_low, limits.position_high - q)
     peak, margin = {"position": np.abs(q).max(axis=0)}, {"position": room.min(axis=0)}
     problems = [
-        f"{arm.joint_names[j]} passes its position limit by {-room[k, j]:.3f} rad at t = {t[k]:.2f} s "
-        f"({q[k, j]:.3f} rad)"
+        f"{arm.joint_names[j]} passes its position limit by {-room[k, j]:.3f} {unit_of('position', limits.slides[j])} "
+        f"at t = {t[k]:.2f} s ({q[k, j]:.3f} {unit_of('position', limits.slides[j])})"
         for j, k in enumerate(room.argmin(axis=0))
         if room[k, j] < 0
     ]
     for name, value in values.items():
-        size, limit, unit = np.abs(value), allowed[name], QUANTITIES[name]
+        size, limit = np.abs(value), allowed[name]
+        units = [unit_of(name, slides) for slides in limits.slides]
         at = size.argmax(axis=0)
         peak[name] = size.max(axis=0)
         margin[name] = limit - peak[name]
         problems += [
-            f"{arm.joint_names[j]} passes its {name} limit of {limit[j]:.4g} {unit} with {size[k, j]:.4g} {unit} "
-            f"at t = {t[k]:.2f} s"
+            f"{arm.joint_names[j]} passes its {called(name, limits.slides[j])} limit of {limit[j]:.4g} {units[j]} with "
+            f"{size[k, j]:.4g} {units[j]} at t = {t[k]:.2f} s"
             for j, k in enumerate(at)
             if size[k, j] > limit[j]
         ]
@@ -152,6 +158,7 @@ def check_motion(
         floor_nearest,
         self_nearest,
         problems,
+        limits.slides,
     )
 
 
@@ -199,9 +206,10 @@ def _jumps(arm: Arm, t: NDArray, dq: NDArray, ddq: NDArray) -> list[str]:
         for k in (0, -1):
             j = int(np.argmax(np.abs(value[k]) / limit))
             if abs(value[k, j]) > _AT_REST * limit[j]:
+                unit = unit_of(name, arm.limits.slides[j])
                 out.append(
-                    f"{arm.joint_names[j]} has {name} {value[k, j]:.3g} {QUANTITIES[name]} at t = {t[k]:.2f} s where "
-                    "the arm is at rest: use FourierMotion.smooth()"
+                    f"{arm.joint_names[j]} has {name} {value[k, j]:.3g} {unit} at t = {t[k]:.2f} s where the arm is at "
+                    "rest: use FourierMotion.smooth()"
                 )
     return out
 

@@ -16,6 +16,7 @@ from armload.errors import MotionError
 from armload.motion.motion import Motion
 from armload.motion.motion_file import write_whole
 
+LEAD = 5.0  # [s] for getting to the start
 RATES = {"csv": 1000.0, "ros2": 100.0, "ur": 500.0}  # [Hz] by format, the default
 
 
@@ -25,7 +26,7 @@ def export_motion(
     format: str = "csv",
     rate: float | None = None,
     joint_names: Sequence[str] | None = None,
-    lead: float = 5.0,
+    lead: float = LEAD,
 ) -> None:
     """Write a motion as a file that a robot's own tools read, complete or not at all.
 
@@ -43,10 +44,10 @@ def export_motion(
         joint_names: the joints in the order of q, as the robot's driver calls them (`arm.joint_names`); needed by
             "ros2".
         lead: time for getting to the start in a "ros2" trajectory [s]: its first point comes so late, and the
-            controller interpolates from wherever the arm is. That way is not checked; be near the start.
+            controller interpolates from wherever the arm is. That way is not checked; be near the start. 0: it is.
 
     Raises:
-        MotionError: an unknown format, a rate or lead that is not positive, joint names missing or too few, a "ur"
+        MotionError: an unknown format, a rate that is not positive, a lead below 0, joint names missing, a "ur"
             motion that has not 6 joints, or a file that cannot be written.
     """
     write_whole(path, motion_text(motion, format, rate, joint_names, lead))
@@ -57,7 +58,7 @@ def motion_text(
     format: str = "csv",
     rate: float | None = None,
     joint_names: Sequence[str] | None = None,
-    lead: float = 5.0,
+    lead: float = LEAD,
 ) -> str:
     """The text that `export_motion` writes; arguments and errors as there."""
     if format not in RATES:
@@ -65,8 +66,8 @@ def motion_text(
     rate = RATES[format] if rate is None else float(rate)
     if not (np.isfinite(rate) and rate > 0):
         raise MotionError(f"rate of the export is {rate} Hz: expected a positive number")
-    if not (np.isfinite(lead) and lead > 0):
-        raise MotionError(f"lead of the export is {lead} s: expected a positive time for getting to the start")
+    if not (np.isfinite(lead) and lead >= 0):
+        raise MotionError(f"lead of the export is {lead} s: expected a time for getting to the start, of 0 or more")
     steps = max(1, round(motion.duration * rate))
     t = np.linspace(0.0, motion.duration, steps + 1)
     if format == "csv":

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from armload.motion.spline import SplineMotion
 
 FORMAT = "armload-motion-1"
+_TRAJECTORY = "it is a JointTrajectory, for controllers; `motion enrich` reads it, and writes .json and .csv, too"
 _SPLINE, _PATH = "b-spline", "path"
 
 
@@ -118,9 +119,12 @@ def _content(text: str, where: str) -> dict[str, Any]:
     try:
         content: Any = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise MotionError(f"{where} is not a motion: it is not JSON ({error})") from None
+        what = _TRAJECTORY if "joint_names:" in text else f"it is not JSON ({error})"
+        raise MotionError(f"{where} is not a motion: {what}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise MotionError(f'{where} is not a motion: expected a JSON object with "format": "{FORMAT}"')
+        trajectory = isinstance(content, dict) and "joint_names" in content
+        what = _TRAJECTORY if trajectory else f'expected a JSON object with "format": "{FORMAT}"'
+        raise MotionError(f"{where} is not a motion: {what}")
     if "kind" in content and content["kind"] not in (_SPLINE, _PATH):
         raise MotionError(
             f'{where} is a motion of the kind {content["kind"]!r}: expected "{_SPLINE}", "{_PATH}", or no kind'

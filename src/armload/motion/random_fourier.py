@@ -119,6 +119,7 @@ def filled_limits(limits: Limits) -> Limits:
         limits.effort,
         acceleration,
         jerk,
+        limits.slides,
     )
 
 

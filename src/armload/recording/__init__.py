@@ -5,7 +5,15 @@ from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import arm_as_set, with_gravity
 from armload.recording.copies import check_own_measurements, digest_of, mark_of, marks_of, shared_samples
-from armload.recording.files import LOG_SUFFIXES, has_topics, is_log, read_recording, write_recording
+from armload.recording.files import (
+    LOG_SUFFIXES,
+    NAMED_SUFFIXES,
+    PACKED_SUFFIXES,
+    has_topics,
+    is_log,
+    read_recording,
+    write_recording,
+)
 from armload.recording.lerobot import data_set_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
 from armload.recording.spooled import blocks, largest, parts_of, span
@@ -19,6 +27,8 @@ __all__ = [
     "GAP",
     "JITTERED",
     "LOG_SUFFIXES",
+    "NAMED_SUFFIXES",
+    "PACKED_SUFFIXES",
     "TURN",
     "Alignment",
     "ColumnSpec",

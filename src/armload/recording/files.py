@@ -23,7 +23,7 @@ from armload.recording.recording import Recording
 from armload.recording.ros_bag import BAG_SUFFIXES, read_bag
 from armload.runtime.atomic import replacing
 
-_NAMED = (".dat", ".log", ".asc", ".npy")  # read where it is named; in a folder it is mostly something else
+NAMED_SUFFIXES = (".dat", ".log", ".asc", ".npy")  # read where it is named; in a folder it is mostly something else
 TABLES = (".csv", ".tsv", ".txt", ".dat", ".log", ".asc")
 _READERS = {
     **dict.fromkeys(TABLES, read_csv),
@@ -34,8 +34,8 @@ _READERS = {
     ".mat": read_mat,
 }
 FORMS = (*_READERS, *BAG_SUFFIXES)
-LOG_SUFFIXES = tuple(suffix for suffix in FORMS if suffix not in _NAMED)
-_PACKED_SUFFIXES = (*UNPACKED, ".zst")
+LOG_SUFFIXES = tuple(suffix for suffix in FORMS if suffix not in NAMED_SUFFIXES)
+PACKED_SUFFIXES = (*UNPACKED, ".zst")
 _FORMS = "CSV, Parquet, NPZ, HDF5, MATLAB, ROS bag or LeRobot folder"
 _WRITERS = {".csv": write_csv, ".parquet": write_parquet, ".npz": write_npz}
 _PACKED = {  # how a file begins that a program has packed
@@ -121,7 +121,7 @@ def read_as_told(path: Path, where: str, arm: Arm | None, topic: str | None, spe
         elif suffix not in _READERS:
             raise RecordingError(
                 f"{where}: unsupported suffix {path.suffix!r}: expected {', '.join(LOG_SUFFIXES)}"
-                f"{'; unpack it first' if suffix in _PACKED_SUFFIXES else _looks_like(path, suffix)}"
+                f"{'; unpack it first' if suffix in PACKED_SUFFIXES else _looks_like(path, suffix)}"
             )
         if path.stat().st_size == 0:
             raise RecordingError(f"{where} is empty: expected a log of at least 2 samples")
@@ -137,7 +137,7 @@ def read_as_told(path: Path, where: str, arm: Arm | None, topic: str | None, spe
 def is_log(path: str | Path) -> bool:
     """Whether a file's name is that of a log, packed or not."""
     path = Path(path)
-    return (path.with_suffix("") if path.suffix.lower() in _PACKED_SUFFIXES else path).suffix.lower() in LOG_SUFFIXES
+    return (path.with_suffix("") if path.suffix.lower() in PACKED_SUFFIXES else path).suffix.lower() in LOG_SUFFIXES
 
 
 def has_topics(path: str | Path) -> bool:

@@ -19,6 +19,7 @@ from pathlib import Path, PurePosixPath
 
 from armload.errors import ArmloadError, UsageError
 from armload.recording import LOG_SUFFIXES, data_set_episodes, is_data_set, is_log
+from armload.survey.remarks import may_be_log, of_passed
 from armload.survey.stores import WILD, is_url, logs_in, stamp_of
 
 NO_FILE = "it is a pipe, a socket or a device: expected a regular file; copy what it gives into one"
@@ -94,7 +95,9 @@ def _hash(file: Path, _size: int, _time: int) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence[Path] = ()) -> list[Log]:
+def find_logs(
+    paths: Sequence[str], arm_of: str | None = None, without: Sequence[Path] = (), passed: set[str] | None = None
+) -> list[Log]:
     """All logs behind some paths, each once, by name.
 
     Args:
@@ -104,6 +107,7 @@ def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence
             fit has none. None: the folder that the log lies in.
         without: files and folders that are passed over, as the survey's own. In folders, the tables of other surveys
             are, too.
+        passed: gets the names of files in folders that are passed over, and may be logs (`may_be_log`).
 
     Raises:
         UsageError: nothing was found, a list cannot be read, or an expression is none, has no group or fits no log.
@@ -111,13 +115,15 @@ def find_logs(paths: Sequence[str], arm_of: str | None = None, without: Sequence
     pattern = _expression(arm_of)
     hidden = {os.path.realpath(path) for path in without}
     found: dict[tuple[str, int | None], Log] = {}
-    for path in _expanded(paths):
-        for name, episode, files in _units(path, hidden):
+    passed = set() if passed is None else passed
+    for path in _expanded(paths, passed):
+        for name, episode, files in _units(path, hidden, passed):
             found.setdefault((name, episode), Log(name, _arm(name, pattern), episode, files))
+    passed -= {name for name, _ in found}  # one may have been named itself
     if not found:
-        raise UsageError(
-            f"no log in {', '.join(paths)}: expected files with the suffix {', '.join(LOG_SUFFIXES)}, or data sets"
-        )
+        expected = f"expected files with the suffix {', '.join(LOG_SUFFIXES)}, or data sets"
+        also = f"; {of_passed(sorted(passed))}" if passed else ""
+        raise UsageError(f"no log in {', '.join(paths)}: {expected}{also}")
     if not any(log.arm for log in found.values()):
         raise UsageError(f"--arm-of {arm_of!r} names no arm in {next(iter(found.values())).name}, nor in any other log")
     return [found[key] for key in sorted(found, key=lambda key: (key[0], -1 if key[1] is None else key[1]))]
@@ -142,16 +148,16 @@ def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
     return "" if match is None else match[1] or ""
 
 
-def _expanded(paths: Sequence[str], within: tuple[str, ...] = ()) -> Iterator[str]:
-    """The paths that are meant; `within`: the lists that they stand in, one in the other."""
+def _expanded(paths: Sequence[str], passed: set[str], within: tuple[str, ...] = ()) -> Iterator[str]:
+    """The paths that are meant; `within`: the lists that they stand in, one in the other. passed: as of `find_logs`."""
     for path in paths:
         if path.startswith("@"):
             here = Path(path[1:])
             if (real := os.path.realpath(here)) in within:
                 raise UsageError(f"the list {here} names itself, directly or through another list: leave that line out")
-            yield from _expanded(_lines(here), (*within, real))
+            yield from _expanded(_lines(here), passed, (*within, real))
         elif is_url(path):
-            yield from logs_in(path)
+            yield from logs_in(path, passed)
         elif WILD.search(path) and not Path(path).exists():
             yield from sorted(glob.glob(path, recursive=True))
         else:
@@ -167,10 +173,11 @@ def _lines(file: Path) -> list[str]:
     return [line for line in lines if line and not line.startswith("#")]
 
 
-def _units(path: str, hidden: set[str]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
+def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
     """Name, episode and files of every unit behind a path.
 
     hidden: real paths that are passed over (`Path.resolve` raises of a loop of links); a folder is one from then on.
+    passed: as of `find_logs`.
     """
     here = Path(path)
     if is_url(path):
@@ -184,14 +191,12 @@ def _units(path: str, hidden: set[str]) -> Iterator[tuple[str, int | None, tuple
     elif (real := os.path.realpath(here)) not in hidden:
         hidden.add(real)
         for inner in inside:
-            known = inner.is_dir() or (is_log(inner) and not is_special(inner))
-            if (
-                known
-                and not inner.name.startswith(".")
-                and os.path.realpath(inner) not in hidden
-                and not of_survey(inner)
-            ):
-                yield from _units(str(inner), hidden)
+            if inner.name.startswith(".") or os.path.realpath(inner) in hidden or of_survey(inner):
+                continue
+            if inner.is_dir() or (is_log(inner) and not is_special(inner)):
+                yield from _units(str(inner), hidden, passed)
+            elif inner.is_file() and may_be_log(inner):
+                passed.add(str(inner))
 
 
 def _inside(folder: Path) -> list[Path] | None:

@@ -22,9 +22,10 @@ from armload.lab.cells import load_cells
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
 from armload.survey.logs import Log, cells_of, find_logs
+from armload.survey.remarks import of_copies, of_left_out, of_passed
 from armload.survey.rows import UNUSABLE
 from armload.survey.settings import Settings
-from armload.survey.table_file import check_suffix, write_rows
+from armload.survey.table_file import check_suffix, logs_in_table, whole, write_rows
 
 _MOST_NAMED = 5  # arms in a sentence: each row has the note of its own
 _MISSING = "missing"  # content of a file that cannot be read
@@ -32,11 +33,15 @@ _MISSING = "missing"  # content of a file that cannot be read
 
 @dataclass(frozen=True)
 class Survey:
-    """What a survey found: rows, sorted by log, episode and time; how many logs, how many of them answered anew."""
+    """What a survey found: rows, sorted by log, episode and time; how many logs, how many of them answered anew.
+
+    passed: files in folders that may be logs, in forms that folders are not searched for.
+    """
 
     rows: list[dict[str, Any]]
     logs: int
     anew: int
+    passed: tuple[str, ...] = ()
 
     @property
     def unusable(self) -> int:
@@ -65,16 +70,18 @@ def survey(
         progress: called as progress(done, total) after every log. say: called with what is being done.
 
     Raises:
-        UsageError: no log was found, or something that is named for all logs is not there.
+        UsageError: no log was found, something that is named for all logs is not there, or `out` is there and is not
+            the table of a survey.
         ArmloadError: the arm or the method is unknown, or a profile, a tool or a model cannot be read.
         OSError: the table or a cell cannot be written.
     """
     out, jobs = check_suffix(out), jobs or os.cpu_count() or 1
     folder = cells_of(out)
     named = [Path(p) for p in (settings.tool, settings.tare, settings.profile) if p is not None]
-    logs = find_logs(paths, arm_of, without=[out, folder, *named])
+    earlier = _earlier(out)
+    logs = find_logs(paths, arm_of, without=[out, folder, *named], passed=(passed := set()))
     if tares := settings.tares_of({log.arm for log in logs} - {""}):  # they may lie among the logs
-        logs = find_logs(paths, arm_of, without=[out, folder, *named, *tares])
+        logs = find_logs(paths, arm_of, without=[out, folder, *named, *tares], passed=(passed := set()))
     n = settings.arm().n
     # what all logs of an arm would fail of is said before the first is answered
     arms = sorted({log.arm for log in logs} - {""})
@@ -84,6 +91,9 @@ def survey(
         if without := settings.arms_without(what, arms):
             of = ", ".join(without[:_MOST_NAMED]) + ", …" * (len(without) > _MOST_NAMED)
             say(f"no --{what} {getattr(settings, what)} of {len(without)} of {len(arms)} arms ({of}): answered without")
+    for remark in (of_passed(sorted(passed)), of_left_out(out, earlier, {whole(log.name) for log in logs})):
+        if remark:
+            say(remark)
     settings.mounted()
     _check_method(settings)
     count = "1 log" if len(logs) == 1 else f"{len(logs)} logs"
@@ -104,10 +114,30 @@ def survey(
         progress=progress,
         lost=_lost,
     )
-    rows = [row for task in tasks for row in (cells.get(task.name) or before[task.name])["rows"]]
+    of_each = [cells.get(task.name) or before[task.name] for task in tasks]
+    answered = [(log, cell) for log, cell in zip(logs, of_each, strict=True) if cell["rows"][0]["status"] != UNUSABLE]
+    if remark := of_copies((log.name, log.episode, cell["content"]) for log, cell in answered):
+        say(remark)
+    rows = [row for cell in of_each for row in cell["rows"]]
     rows.sort(key=lambda row: (row["log"], -1 if row["episode"] is None else row["episode"], row.get("part") or 0))
     write_rows(out, rows, n)
-    return Survey(rows, len(logs), len(fresh))
+    return Survey(rows, len(logs), len(fresh), tuple(sorted(passed)))
+
+
+def _earlier(out: Path) -> set[str]:
+    """The logs of the table that will be replaced.
+
+    Raises:
+        UsageError: what is there is no table of a survey, but a log, say.
+    """
+    if not out.is_file() or not out.stat().st_size:
+        return set()
+    logs = logs_in_table(out)
+    if logs is None and not cells_of(out).is_dir():
+        raise UsageError(
+            f"--out {out} is there, and is no table of a survey: a table would take its place; give another name"
+        )
+    return logs or set()
 
 
 def _check_method(settings: Settings) -> None:

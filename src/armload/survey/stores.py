@@ -10,6 +10,7 @@ from typing import Any
 
 from armload.errors import ArmloadError, UsageError, one_line
 from armload.recording import is_log
+from armload.survey.remarks import may_be_log
 
 WILD = re.compile(r"[*?\[]")  # what makes a path a pattern
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://")
@@ -66,8 +67,10 @@ def _of_web(fs: Any, url: str) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def logs_in(url: str) -> Iterator[str]:
+def logs_in(url: str, passed: set[str]) -> Iterator[str]:
     """The URLs of the logs that a URL names: itself, what fits its pattern, or what is below it as a folder.
+
+    passed: as of `find_logs`.
 
     Raises:
         OSError: the store cannot be asked what fits a pattern.
@@ -80,7 +83,11 @@ def logs_in(url: str) -> Iterator[str]:
     elif not is_log(inside):  # to ask a web server whether it is a folder fetches it
         with suppress(Exception):  # of the store's package: the row of what is named will say why
             there = fs.find(inside) if fs.isdir(inside) else there
-    yield from (fs.unstrip_protocol(one) for one in there if one == inside or is_log(one))
+    for one in there:
+        if one == inside or is_log(one):
+            yield fs.unstrip_protocol(one)
+        elif may_be_log(one):
+            passed.add(fs.unstrip_protocol(one))
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from armload.runtime.atomic import replacing
 from armload.survey.rows import FLAG, NUMBER, TEXT, WHOLE, columns
 
 SUFFIXES = (".parquet", ".csv", ".json")
+_OF_SURVEY = {"log", "status", "reason"}  # columns that no log has
 _JOINTS = "offset_"  # columns that tell how many joints there are
 
 
@@ -35,7 +36,7 @@ def write_rows(path: str | Path, rows: Sequence[dict[str, Any]], n: int) -> None
         UsageError: unknown suffix. OSError: it cannot be written. ModuleNotFoundError: pyarrow is not installed.
     """
     path, kinds = check_suffix(path), columns(n)
-    rows = [{name: _whole(row.get(name)) for name in kinds} for row in rows]
+    rows = [{name: whole(row.get(name)) for name in kinds} for row in rows]
     suffix = path.suffix.lower()
     with replacing(path) as temporary:
         if suffix == ".parquet":
@@ -70,7 +71,7 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
             rows = json.loads(path.read_text(encoding="utf-8"))
         n = sum(name.startswith(_JOINTS) for name in rows[0])
         kinds = columns(n)
-        if not {"log", "status", "reason"} <= set(rows[0]):
+        if not set(rows[0]) >= _OF_SURVEY:
             raise UsageError(
                 f"{path} is no table of a survey, but a log or another table: expected what `armload survey` wrote"
             )
@@ -87,6 +88,28 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
         ) from None
 
 
+def logs_in_table(path: Path) -> set[str] | None:
+    """The logs that a survey's table names, of whatever version; None: it is no such table."""
+    try:
+        if path.suffix.lower() == ".parquet":
+            from pyarrow import parquet
+
+            names = set(parquet.read_schema(path).names)
+            logs = parquet.read_table(path, columns=["log"], use_threads=False)["log"].to_pylist()
+        elif path.suffix.lower() == ".csv":
+            with path.open(encoding="utf-8", newline="") as file:
+                reader = csv.DictReader(file)
+                names, logs = set(reader.fieldnames or ()), [row["log"] for row in reader]
+        else:
+            rows = json.loads(path.read_text(encoding="utf-8"))
+            names, logs = set(rows[0]), [row["log"] for row in rows]
+        return set(logs) if names >= _OF_SURVEY else None
+    except ModuleNotFoundError:
+        raise
+    except Exception:  # a damaged file can fail anywhere in the decoder
+        return None
+
+
 def _write_parquet(path: Path, rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> None:
     import pyarrow as pa
     from pyarrow import parquet
@@ -97,7 +120,7 @@ def _write_parquet(path: Path, rows: Sequence[dict[str, Any]], kinds: dict[str, 
     parquet.write_table(pa.Table.from_arrays(made, schema=schema), path, compression="zstd")
 
 
-def _whole(value: Any) -> Any:
+def whole(value: Any) -> Any:
     """A value that every form can hold: a path whose bytes are no UTF-8 has them written out, as \\xff."""
     if isinstance(value, str):
         return value.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")

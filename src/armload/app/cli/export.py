@@ -246,7 +246,7 @@ def _on_use(load: Load, to: str, added: bool) -> list[str]:
         if form.maker not in makers:
             notes.append(f"it is about {load.frame}: another maker's flange may have other axes")
     if facts is not None and form.maker and form.maker != facts.controller:
-        notes.append(f"it was identified on a {load.robot}: another maker's flange may have other axes")
+        notes.append(f"it was identified on {load.robot}: another maker's flange may have other axes")
     if to == "franka" and load.relative_to == "arm" and not added:
         notes.append("this contains any hand that is mounted: take off what Desk counts already with --minus")
     if to == "kuka" and load.relative_to == "arm" and not added:

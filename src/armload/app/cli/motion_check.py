@@ -117,15 +117,17 @@ def passed(log: Recording, arm: Arm) -> list[str]:
     """One sentence for each limit of position or velocity that the measured motion passes."""
     import numpy as np
 
+    from armload.arms.units import unit_of
+
     limits = arm.limits
     beyond = {
-        "position": (np.maximum(limits.position_low - log.q, log.q - limits.position_high), log.q, "rad"),
-        "velocity": (np.abs(log.dq) - limits.velocity, log.dq, "rad/s"),
+        "position": (np.maximum(limits.position_low - log.q, log.q - limits.position_high), log.q),
+        "velocity": (np.abs(log.dq) - limits.velocity, log.dq),
     }
     return [
-        f"{arm.joint_names[j]} passes its {name} limit by {over[k, j]:.3g} {unit} at t = {log.t[k]:.2f} s "
-        f"({value[k, j]:.4g} {unit})"
-        for name, (over, value, unit) in beyond.items()
+        f"{arm.joint_names[j]} passes its {name} limit by {over[k, j]:.3g} {unit_of(name, limits.slides[j])} at "
+        f"t = {log.t[k]:.2f} s ({value[k, j]:.4g} {unit_of(name, limits.slides[j])})"
+        for name, (over, value) in beyond.items()
         for j, k in enumerate(over.argmax(axis=0))
         if over[k, j] > 0.0
     ]
@@ -135,15 +137,18 @@ def print_passed(log: Recording, arm: Arm, problems: list[str]) -> None:
     """What a log leaves of the limits, as measured."""
     import numpy as np
 
+    from armload.arms.units import heading, marked
+
     room = np.minimum(log.q - arm.limits.position_low, arm.limits.position_high - log.q).min(axis=0)
     speed = arm.limits.velocity - np.abs(log.dq).max(axis=0)
     rows = table(
         f"{log.source} on {arm.name}, {log.duration:.2f} s: what was left to each limit, as measured",
         "joint",
-        "position [rad]",
-        "velocity [rad/s]",
+        heading("position", arm.limits.slides),
+        heading("velocity", arm.limits.slides),
     )
-    for name, left, slower in zip(arm.joint_names, room, speed, strict=True):
+    joints = [marked(name, arm.limits.slides, j) for j, name in enumerate(arm.joint_names)]
+    for name, left, slower in zip(joints, room, speed, strict=True):
         rows.add_row(name, *("no limit" if np.isinf(x) else f"{x:.2f}" for x in (left, slower)))
     console().print(rows)
     print("the arm stayed within its limits" if not problems else "the arm passed its limits:")

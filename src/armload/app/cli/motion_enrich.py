@@ -50,11 +50,14 @@ def run_enrich(options: argparse.Namespace) -> int:
     from armload.excitation import enrich, touched_by
     from armload.inertia import NAMES, UNITS
     from armload.motion import export_motion, save_motion
+    from armload.motion.export import LEAD
 
     out = Path(options.out)
     if out.suffix.lower() not in _FORMATS:
         raise UsageError(f"{out} has the ending {out.suffix!r}: expected one of {', '.join(_FORMATS)}")
     arm = arm_of(options)
+    if _FORMATS[out.suffix.lower()] == "ur" and arm.n != 6:
+        raise UsageError(f"{out} would be a program for UR robots, which have 6 joints: {arm.name} has {arm.n}")
     path = read_path(options.path, arm)
     # a task's path keeps to the limits themselves, not to a share of them, unless one is asked for
     options.share = 1.0 if options.share is None else options.share
@@ -76,7 +79,10 @@ def run_enrich(options: argparse.Namespace) -> int:
     if form is None:
         save_motion(out, found.motion)
     else:
-        export_motion(found.motion, out, form, joint_names=arm.joint_names)
+        lead = getattr(path, "begins", None)  # a trajectory's own time; of another path nobody said any
+        export_motion(found.motion, out, form, joint_names=arm.joint_names, lead=LEAD if lead is None else lead)
+        if form == "ros2" and lead is None:
+            print_note(f"in {out} the first point is due after {LEAD:g} s, in which the arm gets to the path's start")
     if options.json:
         print_json(
             {

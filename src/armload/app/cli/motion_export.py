@@ -76,6 +76,7 @@ def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
     Raises:
         MotionError: another number of joints, or one of both is not allowed.
     """
+    from armload.arms.units import unit_of
     from armload.measuring.plan import APPROACH, Room, plan_of
     from armload.motion import JoinedMotion
 
@@ -84,8 +85,10 @@ def _led(motion: Motion, arm: Arm, options: argparse.Namespace) -> Motion:
     for j, at in enumerate(options.start):
         low, high = arm.limits.position_low[j], arm.limits.position_high[j]
         if not low <= at <= high:
+            unit = unit_of("position", arm.limits.slides[j])
             raise MotionError(
-                f"--from has {arm.joint_names[j]} at {at:.4g} rad: expected a position from {low:.4g} to {high:.4g} rad"
+                f"--from has {arm.joint_names[j]} at {at:.4g} {unit}: expected a position from {low:.4g} to "
+                f"{high:.4g} {unit}"
                 f"{arm.limits.as_degrees(options.start)}"
             )
     approach = APPROACH if options.approach is None else options.approach

@@ -40,6 +40,8 @@ def run_show(options: argparse.Namespace) -> int:
     """Print the table; draw, or serve, what is asked for."""
     import numpy as np
 
+    from armload.arms.units import heading, marked
+
     if not options.page and (options.box or any(x is not None for x in (options.host, options.port, options.held))):
         raise UsageError("--host, --port, --box and --held are of the page, but there is no --page")
     named, options.robot = options.robot is not None, options.robot or _DEFAULT
@@ -50,18 +52,19 @@ def run_show(options: argparse.Namespace) -> int:
         from armload.lab.report.motion_figure import write_motion_figure
 
         write_motion_figure(motion, arm, options.figure)
+    slides = arm.limits.slides if arm.n == motion.n else np.zeros(motion.n, bool)
     q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
     rows = table(
         f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
         "joint",
-        "from [rad]",
-        "to [rad]",
-        "fastest [rad/s]",
-        "hardest [rad/s²]",
+        heading("position", slides, "from"),
+        heading("position", slides, "to"),
+        heading("velocity", slides, "fastest"),
+        heading("acceleration", slides, "hardest"),
     )
     peaks = zip(q.min(axis=0), q.max(axis=0), abs(dq).max(axis=0), abs(ddq).max(axis=0), strict=True)
     for k, values in enumerate(peaks, start=1):
-        rows.add_row(str(k), *(f"{value:.3f}" for value in values))
+        rows.add_row(marked(str(k), slides, k - 1), *(f"{value:.3f}" for value in values))
     console().print(rows)
     if note := getattr(motion, "note", ""):
         print(note)

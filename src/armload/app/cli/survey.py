@@ -111,6 +111,7 @@ def run(options: argparse.Namespace) -> None:
         )
     learned = _learned(options, settings, found) if options.learn_profiles is not None else {}
     about = {"logs": found.logs, "answered_anew": found.anew, "rows": len(found.rows), "unusable": found.unusable}
+    about["passed_over"] = len(found.passed)
     if options.json:
         print_json(about | {"out": options.out, "profiles": learned})
         return

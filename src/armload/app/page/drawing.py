@@ -82,7 +82,8 @@ def arm_parts(arm: Arm) -> list[Part]:
     steps = np.array([R[k].T @ (p[k + 1] - p[k]) for k in range(arm.n + 1)])  # to the next frame, in this frame's axes
     reach = float(np.linalg.norm(steps, axis=1).sum())
     radii = reach * np.linspace(_THICK, _THIN, arm.n + 1)
-    axes = [motion.jacobian[0, :3, k] for k, motion in enumerate(arm.link_motions(q[None]))]
+    rows = [slice(3, 6) if slides else slice(0, 3) for slides in arm.limits.slides]  # which part of a twist it moves by
+    axes = [motion.jacobian[0, rows[k], k] for k, motion in enumerate(arm.link_motions(q[None]))]
     parts = [Part(0, "joint", drum((0.0, 0.0, 0.2 * radii[0]), (0.0, 0.0, 1.0), 1.6 * radii[0], 0.4 * radii[0]))]
     for k, step in enumerate(steps):
         if k:

@@ -16,6 +16,7 @@ from armload.app.page.scene import HELD, REGION, TRUTH, DrawnArm
 from armload.app.page.server import PageServer, look_at_arm
 from armload.app.page.style import SHEET, TEXT
 from armload.arms import PAYLOAD_REACH, Arm
+from armload.arms.units import heading, marked
 from armload.excitation import Surroundings
 from armload.motion import Motion, check_joints
 
@@ -142,10 +143,13 @@ class MotionPage:
             share = f"{100 * abs(dq[k]) / most:.0f} %" if np.isfinite(most) else "no limit"
             cells = "".join(f'<td style="text-align:right;padding:0 6px">{x}</td>' for x in
                             (f"{q[k]:+.3f}", f"{dq[k]:+.3f}", share))  # fmt: skip
-            rows.append(f'<tr data-armload="joint{k + 1}"><td>{escape(name)}</td>{cells}</tr>')
+            rows.append(
+                f'<tr data-armload="joint{k + 1}"><td>{escape(marked(name, limits.slides, k))}</td>{cells}</tr>'
+            )
+        where, how_fast = (heading(what, limits.slides).removeprefix(f"{what} ") for what in ("position", "velocity"))
         head = "".join(
             f'<th style="text-align:{side};font-weight:600;padding:0 6px">{text}</th>'
-            for text, side in (("joint", "left"), ("[rad]", "right"), ("[rad/s]", "right"), ("of its limit", "right"))
+            for text, side in (("joint", "left"), (where, "right"), (how_fast, "right"), ("of its limit", "right"))
         )
         distances = zip(("floor", "itself", "boxes"), self._around.clearance(q[None])[0], strict=True)
         near = ", ".join(f"{what} {1000 * far:.0f} mm" for what, far in distances if np.isfinite(far))

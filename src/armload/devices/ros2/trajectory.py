@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.errors import MotionError
 from armload.motion import Motion
 
@@ -36,6 +37,7 @@ class TrajectoryMotion(Motion):
     Args:
         times: (K,) [s], the first of them 0, rising.
         positions: (K, n) [rad]; velocities [rad/s], accelerations [rad/s²]: the same, or None.
+        begins: when the first point is due, counted from when the trajectory was to start [s]; None: nobody said.
         leaving: velocity (n,) at the first point, where `velocities` is None; None: from rest [rad/s].
 
     Raises:
@@ -48,6 +50,7 @@ class TrajectoryMotion(Motion):
     accelerations: ArrayLike | None = None
     leaving: ArrayLike | None = None
     name: str = "trajectory"
+    begins: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("times", "positions", "velocities", "accelerations"):
@@ -168,13 +171,13 @@ def _check_limits(arm: Arm, motion: TrajectoryMotion) -> None:
     t = np.linspace(0.0, motion.duration, max(2, int(np.ceil(motion.duration / _LOOK)) + 1))
     q, dq, _ = motion(t)
     limits = arm.limits
-    for what, over, unit in (
-        ("position", np.maximum(limits.position_low - q, q - limits.position_high), "rad"),
-        ("velocity", np.abs(dq) - limits.velocity, "rad/s"),
+    for what, over in (
+        ("position", np.maximum(limits.position_low - q, q - limits.position_high)),
+        ("velocity", np.abs(dq) - limits.velocity),
     ):
         k, j = np.unravel_index(np.argmax(over), over.shape)
         if over[k, j] > _SLACK:
             raise MotionError(
-                f"the trajectory takes {arm.joint_names[j]} past its {what} limit by {over[k, j]:.3g} {unit} at "
-                f"{t[k]:.2f} s: expected a motion within the limits of {arm.name}"
+                f"the trajectory takes {arm.joint_names[j]} past its {what} limit by {over[k, j]:.3g} "
+                f"{unit_of(what, limits.slides[j])} at {t[k]:.2f} s: expected a motion within the limits of {arm.name}"
             )

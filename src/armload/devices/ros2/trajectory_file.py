@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -86,7 +87,7 @@ def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
             "points with positions and time_from_start"
         ) from None
     rest = np.zeros(arm.n)
-    return read_trajectory(message, arm, (start, rest, rest))
+    return replace(read_trajectory(message, arm, (start, rest, rest)), begins=first)
 
 
 def _table(text: str, name: str, arm: Arm) -> Motion:
@@ -95,7 +96,9 @@ def _table(text: str, name: str, arm: Arm) -> Motion:
     names = [cell.strip() for cell in header.split(",")]
     wanted = {kind: [f"{kind}{k + 1}" for k in range(arm.n)] for kind in ("q", "dq", "ddq")}
     if "t" not in names or any(column not in names for column in wanted["q"]) or f"q{arm.n + 1}" in names:
-        raise MotionError(f"{name} has the columns {', '.join(names)}: expected t, q1 … q{arm.n} in s and rad")
+        raise MotionError(
+            f"{name} has the columns {', '.join(names)}: expected t, q1 … q{arm.n} in s and rad, parted by commas"
+        )
     try:
         rows = np.array([[float(cell) for cell in line.split(",")] for line in lines]).reshape(-1, len(names))
         t = rows[:, names.index("t")]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armload.arms import Arm
+from armload.arms.units import heading, marked
 from armload.errors import ReportError
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.motion import Motion, check_joints, rated_load
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _INSTANTS = 600
+_WRITTEN = 0.17  # of an axis's height, which a number at its edge takes
 _EDGE = "#B00020"  # of the limits
 
 
@@ -32,19 +34,16 @@ def motion_figure(motion: Motion, arm: Arm) -> Figure:
     t = np.linspace(0.0, motion.duration, _INSTANTS)
     q, dq, ddq = motion(t)
     limits, load = arm.limits, rated_load(arm)
-    curves = [("position [rad]", [q], limits.position_low, limits.position_high)]
-    for title, x, most in (
-        ("velocity [rad/s]", dq, limits.velocity),
-        ("acceleration [rad/s²]", ddq, limits.acceleration),
-    ):
-        curves.append((title, [x], -most, most))
+    curves = [("position", [q], limits.position_low, limits.position_high)]
+    for what, x, most in (("velocity", dq, limits.velocity), ("acceleration", ddq, limits.acceleration)):
+        curves.append((what, [x], -most, most))
     torques = [arm.torque(q, dq, ddq)] + ([] if load is None else [arm.with_payload(load).torque(q, dq, ddq)])
-    curves.append(("torque [N·m]", torques, -limits.effort, limits.effort))
+    curves.append(("torque", torques, -limits.effort, limits.effort))
     with look():
         figure = new_figure(1.15 * arm.n + 0.6)
         axes = figure.subplots(arm.n, len(curves), sharex=True, squeeze=False)
-        for column, (title, lines, low, high) in enumerate(curves):
-            axes[0, column].set_title(title)
+        for column, (what, lines, low, high) in enumerate(curves):
+            axes[0, column].set_title(heading(what, limits.slides))
             for j in range(arm.n):
                 axis = axes[j, column]
                 for k, values in enumerate(lines):
@@ -52,7 +51,8 @@ def motion_figure(motion: Motion, arm: Arm) -> Figure:
                 _limit(axis, np.concatenate([x[:, j] for x in lines]), float(low[j]), float(high[j]))
                 axis.tick_params(labelsize=7)
         for j, name in enumerate(arm.joint_names):
-            axes[j, 0].set_ylabel(name.removeprefix(f"{arm.name}_").removesuffix("_joint"), fontsize=8)
+            short = name.removeprefix(f"{arm.name}_").removesuffix("_joint")
+            axes[j, 0].set_ylabel(marked(short, limits.slides, j).replace(" ", "\n"), fontsize=8)
         for axis in axes[-1]:
             axis.set_xlabel("time [s]")
         held = "" if load is None else "; torque empty (blue) and with the rated payload (orange)"
@@ -78,7 +78,9 @@ def write_motion_figure(motion: Motion, arm: Arm, path: str | Path) -> None:
 def _limit(axis, values: np.ndarray, low: float, high: float) -> None:
     """Lines at the limits where they are near, else their numbers at the edge."""
     span = max(float(np.ptp(values)), 0.02)
-    bottom, top = float(values.min()) - 0.15 * span, float(values.max()) + 0.15 * span
+    least, most = float(values.min()), float(values.max())
+    bottom, top = least - 0.15 * span, most + 0.15 * span
+    written: list[str] = []
     for at, edge in ((low, "bottom"), (high, "top")):
         if not np.isfinite(at):
             continue
@@ -88,4 +90,11 @@ def _limit(axis, values: np.ndarray, low: float, high: float) -> None:
         else:
             y = 0.03 if edge == "bottom" else 0.97
             axis.text(0.99, y, f"{at:.3g}", transform=axis.transAxes, ha="right", va=edge, fontsize=6, color=_EDGE)
+            written.append(edge)
+    # room for the numbers: no curve, and no line of a limit, comes to where they stand
+    for _ in written:
+        if "bottom" in written:
+            bottom = min(bottom, (least - _WRITTEN * top) / (1.0 - _WRITTEN))
+        if "top" in written:
+            top = max(top, (most - _WRITTEN * bottom) / (1.0 - _WRITTEN))
     axis.set_ylim(bottom, top)

@@ -1,0 +1,80 @@
+"""What a survey says of its logs as a whole: files it passed over, logs that leave its table, copies."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path, PurePosixPath
+
+from armload.recording import NAMED_SUFFIXES, PACKED_SUFFIXES, is_log
+
+_MOST_NAMED = 3  # files in a sentence
+# of spreadsheets, archives, and what other programs keep measured series in
+_OTHERS = {
+    *(".xlsx", ".xls", ".xlsm", ".xlsb", ".ods"),
+    *(".tar", ".tgz", ".tbz2", ".txz", ".7z", ".rar"),
+    *(".feather", ".arrow", ".orc", ".pq", ".pkl", ".pickle", ".jsonl", ".hdf", ".tdms", ".mf4"),
+}
+_UNFINISHED = {".active", ".part", ".partial", ".filepart", ".crdownload", ".tmp"}  # of a log that is being written
+
+
+def may_be_log(path: str | Path) -> bool:
+    """Whether a file that is no log by its name (`is_log`) may be one in a form that no folder is searched for.
+
+    >>> [may_be_log(name) for name in ("a.xlsx", "a.bag.active", "month.tar.gz", "notes.md", "notes.md.gz")]
+    [True, True, True, False, False]
+    """
+    name = PurePosixPath(path)
+    suffix = name.suffix.lower()
+    if suffix in PACKED_SUFFIXES:
+        return PurePosixPath(name.stem).suffix.lower() in ("", ".tar", *NAMED_SUFFIXES)
+    return suffix in _OTHERS or suffix in NAMED_SUFFIXES or (suffix in _UNFINISHED and is_log(name.stem))
+
+
+def of_passed(names: Sequence[str]) -> str:
+    """The sentence on files in folders that may be logs and were passed over; empty: there are none."""
+    if not names:
+        return ""
+    kinds = Counter(PurePosixPath(name).suffix.lower() for name in names)
+    which = ", ".join(f"{count} {suffix}" for suffix, count in sorted(kinds.items()))
+    some = sorted(name for name in names if PurePosixPath(name).suffix.lower() not in NAMED_SUFFIXES) or sorted(names)
+    read = [suffix for suffix in sorted(kinds) if suffix in (*NAMED_SUFFIXES, ".zip")]
+    advice = []
+    if len(read) < len(kinds):
+        advice.append("save or unpack what is a log in a form that is read (docs/recordings.md)")
+    if read:
+        verb = "are" if len(read) > 1 else "is"
+        advice.append(f"{', '.join(read)} {verb} read where a path or a glob names the file")
+    files = "1 file that may be a log" if len(names) == 1 else f"{len(names)} files that may be logs"
+    return f"passed over {files}, by their endings ({which}: {_some(some)}): {'; '.join(advice)}"
+
+
+def of_left_out(out: Path, before: Collection[str], now: Collection[str]) -> str:
+    """The sentence on logs of a table that is there which the one in its place will not hold; empty: there are none."""
+    gone = sorted(set(before) - set(now))
+    if not gone:
+        return ""
+    logs = "1 log that is" if len(gone) == 1 else f"{len(gone)} logs that are"
+    return (
+        f"{out} holds {logs} not among those of this survey ({_some(gone)}): the new table leaves them out; to have "
+        "all in one table, name all of them (none is answered twice), else give another --out"
+    )
+
+
+def of_copies(contents: Iterable[tuple[str, int | None, str]]) -> str:
+    """The sentence on logs (name, episode, content) that are others byte for byte; empty: there are none."""
+    first: dict[tuple[int | None, str], str] = {}
+    copies: dict[str, str] = {}
+    for name, episode, content in contents:
+        original = first.setdefault((episode, content), name)
+        if content and original != name:
+            copies.setdefault(name, original)
+    if not copies:
+        return ""
+    logs = "1 log is a copy" if len(copies) == 1 else f"{len(copies)} logs are copies"
+    some = _some([f"{name} of {original}" for name, original in copies.items()])
+    return f"{logs} of others, byte for byte ({some}): each counts as a log of its own"
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:_MOST_NAMED]) + ", …" * (len(names) > _MOST_NAMED)

@@ -1,0 +1,155 @@
+"""An arm on a linear axis: metres and newtons of the joint that slides, radians and N·m of those that turn."""
+
+import json
+
+import numpy as np
+import pytest
+
+from armload.app.cli import main
+from armload.app.cli.motion_check import passed
+from armload.arms import Arm, arm
+from armload.errors import MotionError
+from armload.excitation import Constraints, PayloadRange, problems
+from armload.excitation.verification import used
+from armload.lab.report.motion_figure import motion_figure
+from armload.motion import PathMotion, check_motion, random_motion, save_motion
+from armload.recording import Recording
+
+
+def link(name, mass):
+    return (
+        f'<link name="{name}"><inertial><origin xyz="0.1 0 0.05"/><mass value="{mass}"/>'
+        '<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>'
+    )
+
+
+def joint(name, kind, parent, child, limits):
+    low, high, speed, effort = limits
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0.2 0 0.5"/><axis xyz="0 0 1"/>'
+        f'<limit lower="{low}" upper="{high}" velocity="{speed}" effort="{effort}"/></joint>'
+    )
+
+
+LIFT = (
+    '<robot name="lift"><link name="base"/>'
+    + joint("up", "prismatic", "base", "one", (0.0, 0.6, 0.8, 300.0))
+    + link("one", 4.0)
+    + joint("turn", "revolute", "one", "two", (-2.5, 2.5, 2.0, 80.0))
+    + link("two", 2.0)
+    + "</robot>"
+)
+
+
+@pytest.fixture(scope="module")
+def lift():
+    return Arm("lift", LIFT)
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "lift.urdf"
+    path.write_text(LIFT)
+    return path
+
+
+def moved(*to, seconds=2.0):
+    still = np.zeros((2, 2))
+    return PathMotion(np.array([0.0, seconds]), np.array([[0.3, 0.2], list(to)]), still, still, "up")
+
+
+def test_limits_know_which_joints_slide(lift, panda):
+    assert lift.limits.slides.tolist() == [True, False]
+    assert panda.limits.slides.tolist() == [False] * 7
+
+
+def test_a_sentence_on_a_limit_of_a_sliding_joint_is_in_metres_and_newtons(lift):
+    found = check_motion(lift, moved(0.9, 3.0, seconds=0.4), payload_radius=0.0)
+    for part in (
+        "up passes its position limit by 0.300 m at t = 0.40 s (0.900 m)",
+        "turn passes its position limit by 0.500 rad at t = 0.40 s (3.000 rad)",
+        "up passes its velocity limit of 0.8 m/s with 2.81",
+        "turn passes its velocity limit of 2 rad/s with 13.1",
+    ):
+        assert any(part in problem for problem in found.problems), found.problems
+    hard = check_motion(lift, moved(0.5, 0.2, seconds=0.12), payload_radius=0.0).problems
+    assert any("up passes its force limit of 300 N with" in problem for problem in hard)
+    assert "position [rad, m]" in str(found)
+    assert "torque [N·m, N]" in str(found)
+    assert "up (slides)" in str(found)
+
+
+def test_a_design_s_limits_are_in_metres_and_newtons_too(lift):
+    allowed = Constraints(lift, np.array([0.3, 0.2]), share=1.0, payload=PayloadRange(1.0))
+    said = problems(allowed, moved(0.9, 3.0, seconds=0.12))
+    assert any("up goes to 0.9 m" in text for text in said)
+    assert any("up has velocity" in text and "0.8 m/s are allowed" in text for text in said)
+    assert any("up has force" in text and "300 N are allowed" in text for text in said)
+    every = [one.text for one in used(allowed, moved(0.9, 3.0))]
+    assert any("turn has torque" in text and "80 N·m are allowed" in text for text in every)
+    with pytest.raises(MotionError, match=r"up starts at 0\.9 m, outside .* 0 to 0\.6 m") as caught:
+        Constraints(lift, np.array([0.9, 0.2]), share=1.0, payload=PayloadRange(1.0))
+    assert "degrees" not in str(caught.value)
+    with pytest.raises(MotionError, match=r"up needs .* N to hold .* more than 300 N"):
+        Constraints(lift, np.array([0.3, 0.2]), share=1.0, payload=PayloadRange(40.0))
+
+
+def test_a_log_s_limits_are_in_metres_too(lift):
+    q = np.array([[0.3, 0.0], [0.7, 0.0], [0.3, 0.0]])
+    said = passed(Recording(np.array([0.0, 0.5, 1.0]), q, np.full((3, 2), 2.5), np.zeros((3, 2))), lift)
+    assert said[0].startswith("up passes its position limit by 0.1 m at t = 0.50 s (0.7 m)")
+    assert any("up passes its velocity limit by 1.7 m/s" in text for text in said)
+    assert any("turn passes its velocity limit by 0.5 rad/s" in text for text in said)
+
+
+def test_show_and_its_figure_give_both_units(lift, file, tmp_path, capsys):
+    save_motion(tmp_path / "up.json", moved(0.5, 0.4))
+    assert main(["motion", "show", str(tmp_path / "up.json"), "--robot", str(file)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 (slides)" in said
+    assert "[rad, m]" in said
+    assert "2 (slides)" not in said
+    titles = [axis.get_title() for axis in motion_figure(moved(0.5, 0.4), lift).axes[:4]]
+    assert titles == ["position [rad, m]", "velocity [rad/s, m/s]", "acceleration [rad/s², m/s²]", "torque [N·m, N]"]
+    assert main(["motion", "check", str(tmp_path / "up.json"), "--robot", str(file), "--payload", "none"]) == 0
+    assert "velocity [rad/s, m/s]" in capsys.readouterr().out
+
+
+def test_an_arm_that_turns_alone_has_no_metres(panda, tmp_path, capsys):
+    motion = PathMotion(np.array([0.0, 2.0]), np.zeros((2, 7)), np.zeros((2, 7)), np.zeros((2, 7)))
+    save_motion(tmp_path / "m.json", motion)
+    assert main(["motion", "show", str(tmp_path / "m.json"), "--robot", "panda"]) == 0
+    assert "slides" not in capsys.readouterr().out
+    assert motion_figure(motion, panda).axes[3].get_title() == "torque [N·m]"
+
+
+@pytest.mark.parametrize(("name", "seed"), [("panda", 3), ("ur10e", 0), ("iiwa14", 1)])
+def test_no_curve_passes_where_the_number_of_a_limit_is_written(name, seed):
+    """A curve that is highest or lowest at the end of its motion, far from the limit."""
+    of = arm(name)
+    figure = motion_figure(random_motion(of, seed, duration=3.0), of)
+    figure.set_dpi(150)
+    figure.canvas.draw()
+    for axis in figure.axes:
+        for text in axis.texts:
+            box = text.get_window_extent().transformed(axis.transData.inverted())
+            for line in axis.lines:
+                x, y = (np.asarray(part, dtype=float) for part in line.get_data())
+                inside = (x >= box.x0) & (x <= box.x1) & (y >= box.y0) & (y <= box.y1)
+                assert not inside.any(), (text.get_text(), axis.get_title())
+
+
+def test_the_page_names_units_by_joint(lift):
+    pytest.importorskip("viser")
+    from armload.app.page.motion_page import MotionPage
+    from armload.excitation import Surroundings
+
+    page = MotionPage(moved(0.5, 0.4), lift, Surroundings(lift), "127.0.0.1", 0)
+    try:
+        table = page._table(0.0, np.array([0.3, 0.2]), np.zeros(2))
+    finally:
+        page.close()
+    assert "[rad, m]" in table
+    assert "up (slides)" in table
+    assert json.dumps(table).count("(slides)") == 1
