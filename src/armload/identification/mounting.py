@@ -54,9 +54,9 @@ def likelier_gravity(
     other = account(most=FEW_WINDOWS, gears=arm.motor_torque)
     if other is None:
         return None
-    odds = max(other.evidence, other.best) + OTHER_FORM
+    enough = other.best + OTHER_FORM
     return better_gravity(
-        recording, arm, lambda fit: fit.misfit <= MODEL_MISFIT and fit.evidence > odds, arm.motor_torque
+        recording, arm, lambda fit: fit.misfit <= MODEL_MISFIT and fit.evidence > enough, arm.motor_torque
     )
 
 

@@ -176,8 +176,8 @@ EXCHANGED_BY_GEARS = 1.0
 # of another robot, unit, sign or base keep 0.3 and more (test_a_payload_that_is_put_down_is_not_taken_for_no_torque)
 PARTS_SHARE = 0.25
 # [log odds] by which another form of the torque, currents or one without gravity, explains a log better than the torque
-# itself, one window in four counting: 7 to 1. The most of 90 sound simulated logs of UR arms is 0.6; of them without
-# gravity, that it is in there, 0.6 (`benchmarks/torque_forms.py`)
+# itself, or a base mounted another way better than either, one window in four counting: 7 to 1. The most of 90 sound
+# simulated logs of UR arms is 0.6; of them without gravity, that it is in there, 0.6 (`benchmarks/torque_forms.py`)
 OTHER_FORM = 2.0
 # [N·m/A] torque constant of a joint, gear included, at least: the wrist of a small arm. A UR10e's are 10 to 12
 # (test_motor_currents_are_called_so_with_what_to_do)
