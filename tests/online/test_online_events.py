@@ -448,9 +448,23 @@ def test_another_payload_of_another_mass_is_no_return():
     assert covers(estimates[-1], other.phi)[:4].all()
 
 
-def test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change():
-    first, other = box(0.39), box(0.41)
-    estimates, events = said(stream(26, [(5.0, first), (10.0, None), (15.0, other)], 24.0), "map-gp")
+def near(method="map-gp"):
+    """Something is taken up, put down, and another thing that weighs 20 g more taken up; and that thing."""
+    other = box(0.41)
+    return *said(stream(26, [(5.0, box(0.39)), (10.0, None), (15.0, other)], 24.0), method), other
+
+
+def test_a_payload_that_weighs_nearly_the_same_is_not_taken_for_the_earlier_one():
+    estimates, events, other = near()
+    late = [e for e in estimates if e.t > 15.5]
+    assert "return" not in {e.event.kind for e in late}
+    assert all(covers(e, other.phi)[0] for e in late)
+    assert [(event.kind, round(event.t)) for event in events] == [("grasp", 5), ("return", 10), ("grasp", 15)]
+
+
+def test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change(monkeypatch):
+    monkeypatch.setattr("armload.online.runs.RETURN_STD_HELD", 0.01)
+    estimates, events, other = near()
     called = [e.event.kind for e in estimates if e.event is not None and e.event.t > 15.0]
     assert "return" in called  # so near that it is taken for the first
     assert [(event.kind, round(event.t)) for event in events] == [("grasp", 5), ("return", 10), ("grasp", 15)]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia import held
-from armload.online.thresholds import LIGHT, REMEMBERED, SAME_RUN, STEP_STD, TARE_FROM
+from armload.online.thresholds import LIGHT, REMEMBERED, RETURN_STD, RETURN_STD_HELD, SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
 
@@ -75,8 +75,15 @@ class Runs:
         return run if empty else run.reference
 
     def is_earlier(self) -> bool:
-        """Whether the mass and first moments of the current run are those of the earlier one."""
-        if self.earlier is None or (step := _step(self.earlier, self.current)) is None:
+        """Whether the mass and first moments of the current run are those of the earlier one.
+
+        Nothing is the same each time; of two payloads the mass has to be known better, as others weigh nearly the same.
+        """
+        if self.earlier is None:
+            return False
+        mass, std = float(self.earlier.last.phi[0]), float(self.earlier.last.std[0])
+        enough = RETURN_STD_HELD if held(mass, std, True) else RETURN_STD
+        if self.current.last.std[0] > enough * self.unit or (step := _step(self.earlier, self.current)) is None:
             return False
         phi, covariance = step[0][:4], step[1][:4, :4]
         return bool(phi @ np.linalg.solve(covariance, phi) < SAME_RUN)
