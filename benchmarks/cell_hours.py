@@ -19,12 +19,14 @@ with another seed than 70000.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from event_scenes import LOOKED, STEP, Change, Resting, Stream, body, torque_of
+from event_scenes import LOOKED, Change, Resting, Stream, body, torque_of
 from events import PAGE, code_of_streams, finished_cells, measured_stream, of_part
+from numpy.typing import NDArray
 from script import ROOT, markdown_table, options, write, write_table
 
 from armload import Recording, arm
@@ -49,19 +51,24 @@ class Hours:
     seed: int
 
 
-def streamed(scene: Hours) -> Stream:
-    """The samples of a stream, and what is true of them."""
+def streamed(
+    scene: Hours,
+    seconds: float = SECONDS,
+    apart: tuple[float, float] = APART,
+    draw: Callable[[np.random.Generator], NDArray[np.float64]] = body,
+) -> Stream:
+    """The samples of a stream, and what is true of them; draw: phi (10,) of what is taken up next."""
     rng, panda = np.random.default_rng([scene.seed, KINDS.index(scene.kind), 11]), arm("panda")
     changes, stops, t, phi = [], [], 20.0, np.zeros(10)
-    while t < SECONDS - 2.0 * APART[0]:
+    while t < seconds - 2.0 * apart[0]:
         took = float(np.exp(rng.uniform(*np.log(TAKES[scene.kind]))))
-        phi = np.zeros(10) if phi[0] else body(rng, STEP)
+        phi = np.zeros(10) if phi[0] else draw(rng)
         changes.append(Change(t, took, phi))
         stops.append(t - 2.0)
-        t += took + STANDS * (scene.kind == "standing") + rng.uniform(*APART)
+        t += took + STANDS * (scene.kind == "standing") + rng.uniform(*apart)
     motion: Motion = random_motion(panda, scene.seed)
     if scene.kind == "standing":
-        motion = Resting(motion, tuple(stops), rounds=int(np.ceil(SECONDS / motion.duration)))
+        motion = Resting(motion, tuple(stops), rounds=int(np.ceil(seconds / motion.duration)))
     source = Simulator(
         panda,
         motion,
@@ -70,7 +77,7 @@ def streamed(scene: Hours) -> Stream:
         sensors=Sensors.panda(panda),
         rate=200.0,
         speed=None,
-        duration=SECONDS,
+        duration=seconds,
         seed=scene.seed,
     )
     log = Recording(*map(np.array, zip(*source, strict=True)))  # type: ignore[arg-type]

@@ -384,7 +384,7 @@ def test_while_somebody_pushes_the_arm_a_contact_is_likely_and_nothing_is_called
 def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
     payload, truth = HALF_KILO, HALF_KILO.phi
     log = stream(2, [(5.0, payload), (10.0, None), (15.0, payload)], 20.0)
-    estimates, events = said(log, "map-gp")
+    estimates, events = said(log)
     assert [event.kind for event in events] == ["grasp", "return", "return"]
     for event, t in zip(events, (5.0, 10.0, 15.0), strict=True):
         assert t < event.t < t + 0.3
@@ -427,7 +427,7 @@ def test_a_cycle_in_step_with_the_motion_stays_as_good_in_its_second_half_as_in_
         delays = [event.t - t for event, t in zip(events, changes, strict=True)]
         assert min(delays) > 0.0
         assert np.median(delays) < 0.2
-        assert max(delays) < 0.5
+        assert max(delays) < 0.6
         times = np.array([estimate.t for estimate in estimates])
         after = [estimates[np.searchsorted(times, t + 1.0) - 1] for t in changes]
         error = np.array([estimate.phi[0] for estimate in after]) - truth
@@ -448,9 +448,23 @@ def test_another_payload_of_another_mass_is_no_return():
     assert covers(estimates[-1], other.phi)[:4].all()
 
 
-def test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change():
-    first, other = box(0.39), box(0.41)
-    estimates, events = said(stream(26, [(5.0, first), (10.0, None), (15.0, other)], 24.0), "map-gp")
+def near(method="map-gp"):
+    """Something is taken up, put down, and another thing that weighs 20 g more taken up; and that thing."""
+    other = box(0.41)
+    return *said(stream(26, [(5.0, box(0.39)), (10.0, None), (15.0, other)], 24.0), method), other
+
+
+def test_a_payload_that_weighs_nearly_the_same_is_not_taken_for_the_earlier_one():
+    estimates, events, other = near()
+    late = [e for e in estimates if e.t > 15.5]
+    assert "return" not in {e.event.kind for e in late}
+    assert all(covers(e, other.phi)[0] for e in late)
+    assert [(event.kind, round(event.t)) for event in events] == [("grasp", 5), ("return", 10), ("grasp", 15)]
+
+
+def test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change(monkeypatch):
+    monkeypatch.setattr("armload.online.runs.RETURN_SHARE", 1.0)
+    estimates, events, other = near()
     called = [e.event.kind for e in estimates if e.event is not None and e.event.t > 15.0]
     assert "return" in called  # so near that it is taken for the first
     assert [(event.kind, round(event.t)) for event in events] == [("grasp", 5), ("return", 10), ("grasp", 15)]

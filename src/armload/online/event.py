@@ -86,7 +86,7 @@ class Naming:
         if stream.seconds < KIND_FROM:
             return False
         self.judging = stream.seconds <= RETURN_UNTIL
-        if std <= RETURN_STD and runs.earlier is not None and runs.is_earlier():
+        if runs.is_earlier():
             self.judging, self._recognised = False, True
             self._name("return", runs.mass_step(self._ended, runs.earlier))
             return True

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.inertia import held
-from armload.online.thresholds import LIGHT, REMEMBERED, SAME_RUN, STEP_STD, TARE_FROM
+from armload.online.thresholds import LIGHT, REMEMBERED, RETURN_SHARE, RETURN_STD, SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
 
@@ -75,8 +75,17 @@ class Runs:
         return run if empty else run.reference
 
     def is_earlier(self) -> bool:
-        """Whether the mass and first moments of the current run are those of the earlier one."""
-        if self.earlier is None or (step := _step(self.earlier, self.current)) is None:
+        """Whether the mass and first moments of the current run are those of the earlier one.
+
+        Nothing is the same each time; of payloads the mass has to be known to a share of it, as others weigh nearly as
+        much.
+        """
+        if self.earlier is None:
+            return False
+        enough, then = RETURN_STD * self.unit, self.earlier.last
+        if held(float(then.phi[0]), float(then.std[0]), True):
+            enough = min(enough, RETURN_SHARE * float(then.phi[0]))
+        if self.current.last.std[0] > enough or (step := _step(self.earlier, self.current)) is None:
             return False
         phi, covariance = step[0][:4], step[1][:4, :4]
         return bool(phi @ np.linalg.solve(covariance, phi) < SAME_RUN)
