@@ -214,6 +214,49 @@ def test_a_file_that_is_no_path_is_refused(name, text, words, tmp_path, capsys):
     assert words in capsys.readouterr().err
 
 
+def test_a_path_that_was_written_for_a_controller_is_checked_as_the_motion_that_it_is(tmp_path, capsys):
+    joints_of, start = arm("panda").joint_names, (0.2, -0.4, 0.1, -2.1, 0.0, 1.5, 0.9)
+    (tmp_path / "m.csv").write_text(table_of(start, 0.2))
+    words = ["motion", "export", str(tmp_path / "m.csv"), "--robot", "panda", "--format", "ros2"]
+    assert main([*words, "--out", str(tmp_path / "m.yaml")]) == 0
+    assert joints_of[0] in (tmp_path / "m.yaml").read_text()
+    capsys.readouterr()
+    told = []
+    for name in ("m.csv", "m.yaml"):
+        assert main(["motion", "check", str(tmp_path / name), "--robot", "panda", "--json"]) == 0
+        told.append(json.loads(capsys.readouterr().out))
+    assert told[0]["duration"] == pytest.approx(told[1]["duration"], abs=1e-6)
+    widths = [said["without_tare"]["half_width"] for said in told]
+    np.testing.assert_allclose(*widths, rtol=1e-3)
+    assert main(["motion", "show", str(tmp_path / "m.yaml"), "--robot", "ur5e"]) == 2
+    assert "no JointTrajectory of ur5e" in capsys.readouterr().err
+
+
+def test_of_a_motions_joints_nobody_said_which_slide_unless_a_robot_is_named(tmp_path, capsys):
+    (tmp_path / "m.csv").write_text(table_of((0.1, 0.2), 0.1))
+    assert main(["motion", "show", str(tmp_path / "m.csv")]) == 0
+    assert "m]" in capsys.readouterr().out
+    assert main(["motion", "show", "taie2024"]) == 0
+    told = capsys.readouterr().out
+    assert "rad]" in told
+    assert "m]" not in told
+
+
+def table_of(start, by, seconds=2.0):
+    """The text of a table: every joint goes so far, at rest at both ends."""
+    t = np.linspace(0.0, seconds, 201)
+    x = t / seconds
+    course = [
+        10 * x**3 - 15 * x**4 + 6 * x**5,
+        (30 * x**2 - 60 * x**3 + 30 * x**4) / seconds,
+        (60 * x - 180 * x**2 + 120 * x**3) / seconds**2,
+    ]
+    columns = [t] + [q + by * course[0] for q in start] + [by * part for part in course[1:] for _ in start]
+    kinds = [f"{kind}{k + 1}" for kind in ("q", "dq", "ddq") for k in range(len(start))]
+    rows = [",".join(f"{value:.12g}" for value in row) for row in np.array(columns).T]
+    return "\n".join([",".join(["t", *kinds]), *rows]) + "\n"
+
+
 def test_accuracies_and_joints_are_read_with_their_units():
     assert joints("7,1-2") == (1, 2, 7)
 

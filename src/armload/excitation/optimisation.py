@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from armload.arms.units import unit_of
 from armload.errors import MotionError
 from armload.excitation.constraints import LONGEST, SHORTEST, Constraints
 from armload.excitation.criterion import Criterion, CriterionValue
@@ -214,9 +215,10 @@ def _drawn_together(constraints: Constraints, motion: SplineMotion) -> SplineMot
             break
         motion = replace(motion, control=motion.control * min(_SHRINK, 0.5 * (1.0 + _INSIDE / worst.share)))
         worst = used(constraints, motion)[0]
-    farthest = float(np.abs(motion(np.linspace(0.0, motion.duration, 200))[0] - constraints.start).max())
+    went = np.abs(motion(np.linspace(0.0, motion.duration, 200))[0] - constraints.start).max(axis=0)
+    farthest, unit = float(went.max()), unit_of("position", constraints.arm.limits.slides[went.argmax()])
     if worst.share > _INSIDE or farthest < _STIRRING:
-        what = f"no joint goes farther than {farthest:.3f} rad, as " if farthest < _STIRRING else ""
+        what = f"no joint goes farther than {farthest:.3f} {unit}, as " if farthest < _STIRRING else ""
         raise MotionError(
             f"no motion of {motion.duration:g} s from this pose keeps to the constraints: {what}{worst.text}; start "
             "elsewhere, allow a larger share or a longer time"

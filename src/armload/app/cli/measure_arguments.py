@@ -68,7 +68,7 @@ def parser() -> Parser:
     add(
         "--motion",
         metavar="MOTION",
-        help="taie2024, a JSON or CSV file, or random:SEED (default: designed about the present pose)",
+        help="taie2024, a JSON, CSV or YAML file, or random:SEED (default: designed about the present pose)",
     )
     add("--time", type=at_least(0.2, float, 60.0), default=2.0, metavar="S", help="of a motion that is designed (2)")
     add(

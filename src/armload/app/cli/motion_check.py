@@ -24,7 +24,7 @@ NOT_ALLOWED = 3  # exit code of a check that says no
 def add_check_arguments(parser: argparse.ArgumentParser) -> None:
     """All of `armload motion check`."""
     add = parser.add_argument
-    add("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON or CSV file, or random:SEED")
+    add("motion", metavar="LOG|MOTION", help="a log, or taie2024, a JSON, CSV or YAML file, or random:SEED")
     add_arm_arguments(parser)
     add(
         "--payload",

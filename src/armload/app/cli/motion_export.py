@@ -23,7 +23,7 @@ _LEAD = 0.5  # [s] until the first point of a ros2 trajectory from the present p
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     """All of `armload motion export`."""
     add = parser.add_argument
-    add("motion", metavar="MOTION", help="taie2024, a JSON or CSV file, or random:SEED")
+    add("motion", metavar="MOTION", help="taie2024, a JSON, CSV or YAML file, or random:SEED")
     add_arm_arguments(parser, default=_DEFAULT)
     parser.set_defaults(robot=None)  # a table names no joints: only an arm that is named must fit
     add("--format", required=True, choices=("csv", "ros2", "ur"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
@@ -23,7 +24,7 @@ _DEFAULT = "panda"
 def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     """All of `armload motion show`."""
     add = parser.add_argument
-    add("motion", metavar="MOTION", help="taie2024, a JSON or CSV file, or random:SEED")
+    add("motion", metavar="MOTION", help="taie2024, a JSON, CSV or YAML file, or random:SEED")
     add_arm_arguments(parser, default=_DEFAULT)
     parser.set_defaults(robot=None)  # a table needs no arm: only one that is named must fit
     add("--figure", type=output_file, metavar="F.png", help="draw the joints against their limits")
@@ -52,15 +53,17 @@ def run_show(options: argparse.Namespace) -> int:
         from armload.lab.report.motion_figure import write_motion_figure
 
         write_motion_figure(motion, arm, options.figure)
-    slides = arm.limits.slides if arm.n == motion.n else np.zeros(motion.n, bool)
+    known = named or options.page or options.figure is not None or not Path(options.motion).exists()
+    slides = arm.limits.slides if known else np.zeros(motion.n, bool)
+    units = slides if known else [False, True]  # of a file's joints nobody said which of them slide
     q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
     rows = table(
         f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
         "joint",
-        heading("position", slides, "from"),
-        heading("position", slides, "to"),
-        heading("velocity", slides, "fastest"),
-        heading("acceleration", slides, "hardest"),
+        heading("position", units, "from"),
+        heading("position", units, "to"),
+        heading("velocity", units, "fastest"),
+        heading("acceleration", units, "hardest"),
     )
     peaks = zip(q.min(axis=0), q.max(axis=0), abs(dq).max(axis=0), abs(ddq).max(axis=0), strict=True)
     for k, values in enumerate(peaks, start=1):

@@ -195,19 +195,29 @@ def names_motion(name: str) -> bool:
 
 
 def motion_of(name: str, arm: Arm, of_arm: bool = True) -> Motion:
-    """A motion by name (`taie2024`), from a JSON file or an exported table (CSV), or drawn for the arm (`random:SEED`).
+    """A motion by name (`taie2024`), from a file, or drawn for the arm (`random:SEED`).
+
+    A file is a motion's JSON, an exported table (CSV) or a JointTrajectory (YAML or JSON), whose joints are named and
+    so are always the arm's.
 
     of_arm: whether it must be one of the arm's; else the arm is what a random one is drawn for.
 
     Raises:
         MotionError: it cannot be read, or moves another number of joints than the arm has.
     """
+    from armload.devices.ros2.trajectory_file import is_trajectory, read_path
     from armload.motion import PathMotion, check_joints, load_motion, random_motion, taie2024
 
     if name.startswith("random:"):
         return random_motion(arm, whole_number(name, "motion"))
-    read = PathMotion.read if name.lower().endswith(".csv") else load_motion
-    motion = taie2024() if name == "taie2024" else read(name)
+    if name == "taie2024":
+        motion: Motion = taie2024()
+    elif name.lower().endswith(".csv"):
+        motion = PathMotion.read(name)
+    elif is_trajectory(name):
+        motion = read_path(name, arm)
+    else:
+        motion = load_motion(name)
     if of_arm:
         check_joints(motion, arm)
     return motion

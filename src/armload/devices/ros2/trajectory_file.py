@@ -16,6 +16,14 @@ from armload.errors import MotionError, one_line
 from armload.motion import Motion, check_joints, load_motion
 
 
+def is_trajectory(name: str) -> bool:
+    """Whether a file holds a JointTrajectory by what it names; one that cannot be read does not."""
+    try:
+        return "joint_names" in Path(name).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
 def read_path(name: str, arm: Arm) -> Motion:
     """A task's path from a file: a JointTrajectory (YAML or JSON), a table (CSV), or a motion's own JSON.
 
