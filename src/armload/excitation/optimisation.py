@@ -216,7 +216,7 @@ def _drawn_together(constraints: Constraints, motion: SplineMotion) -> SplineMot
         motion = replace(motion, control=motion.control * min(_SHRINK, 0.5 * (1.0 + _INSIDE / worst.share)))
         worst = used(constraints, motion)[0]
     went = np.abs(motion(np.linspace(0.0, motion.duration, 200))[0] - constraints.start).max(axis=0)
-    farthest, unit = float(went.max()), unit_of("position", constraints.arm.limits.slides[went.argmax()])
+    farthest, unit = float(went.max()), unit_of("position", bool(constraints.arm.limits.slides[went.argmax()]))
     if worst.share > _INSIDE or farthest < _STIRRING:
         what = f"no joint goes farther than {farthest:.3f} {unit}, as " if farthest < _STIRRING else ""
         raise MotionError(
