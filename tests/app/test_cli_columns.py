@@ -124,6 +124,7 @@ def test_columns_for_a_robot_without_a_log_are_refused(capsys):
 IDENTIFY = ("identify", "run_odd.csv", *ROBOT, "--columns", SPEC, "--json")
 
 
+@pytest.mark.full  # some seconds
 def test_a_tare_from_another_tool_has_columns_of_its_own(logs, capsys, monkeypatch):
     monkeypatch.chdir(logs)
     expected = json.loads(run(capsys, "identify", "run.csv", "--tare", "tare.csv", *ROBOT, "--json")[1])["phi"]

@@ -129,6 +129,7 @@ def test_json_has_the_contracts_keys_in_order_and_finite_numbers(answer, logs):
     assert com_to_phi(found["mass"], found["com"], found["inertia_com"]) == pytest.approx(found["phi"], abs=1e-9)
 
 
+@pytest.mark.full  # some seconds
 def test_a_hand_in_the_description_is_a_tool_and_nobody_is_told_to_take_it_off_again(answer, logs, tmp_path, capsys):
     with_hand = (
         '<joint name="to_hand" type="fixed"><origin rpy="0 0 -0.7853981633974483"/>'

@@ -34,6 +34,7 @@ def designed(tmp_path_factory):
     return folder, json.loads(printed.getvalue())
 
 
+@pytest.mark.full  # some seconds
 def test_a_design_is_exported_with_the_pose_first_at_rest_and_the_pose_again(designed, tmp_path):
     folder, said = designed
     for file, lasting in ((said["motion"], 0.5), (said["empty_motion"], 0.6)):

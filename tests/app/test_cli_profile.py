@@ -248,6 +248,7 @@ def long(folder):
     return str(folder / "long.csv")
 
 
+@pytest.mark.full  # some seconds
 def test_measurements_that_a_stream_has_taught_are_learned_once(long, profile, tmp_path, capsys):
     path, record = tmp_path / "learning.profile", str(tmp_path / "record.csv")
     path.write_bytes(profile.read_bytes())
@@ -265,6 +266,7 @@ def test_measurements_that_a_stream_has_taught_are_learned_once(long, profile, t
     assert found["interval"] == "approximate"
 
 
+@pytest.mark.full  # some seconds
 def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, long, profile, tmp_path, monkeypatch):
     from armload.app.cli import headless
 
@@ -283,6 +285,7 @@ def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, lon
     assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
 
 
+@pytest.mark.full  # some seconds
 def test_a_stream_that_is_stopped_by_sigterm_has_taught_its_profile(long, profile, tmp_path, monkeypatch, capsys):
     from armload.app.cli import headless
 

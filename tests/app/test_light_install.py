@@ -135,6 +135,7 @@ def light(request, refused, tmp_path_factory):
     return run
 
 
+@pytest.mark.full  # some seconds
 def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, panda, analytic_log, tmp_path):
     body = payload_of_the_tests()
     log, held = tmp_path / "log.csv", tmp_path / "held.json"
@@ -187,6 +188,7 @@ NEEDS = {
 }
 
 
+@pytest.mark.full  # some seconds
 def test_what_needs_an_extra_says_in_one_sentence_how_to_install_it(light, panda, analytic_log, tmp_path):
     """One process asks for all: none has what it needs, whatever was refused before."""
     log = tmp_path / "log.csv"

@@ -142,6 +142,7 @@ def live():
             pipe.close()
 
 
+@pytest.mark.full  # some seconds
 def test_ctrl_c_and_a_reader_that_has_gone_end_it_in_one_line(live):
     process = live("--headless", "--method", "map", "--every", "0.01")
     assert process.stdout is not None
@@ -158,6 +159,7 @@ def test_ctrl_c_and_a_reader_that_has_gone_end_it_in_one_line(live):
     assert process.stderr.read() == ""
 
 
+@pytest.mark.full  # some seconds
 def test_kill_9_loses_nothing_of_the_record(live, tmp_path):
     record = tmp_path / "record.csv"
     process = live("--headless", "--method", "map", "--every", "0", "--record", record)
@@ -390,6 +392,7 @@ def test_an_answer_is_as_old_as_its_samples_have_waited(panda, analytic_log, mon
     assert ("this machine is too busy" in stream("log", session.estimate)) == (speed is not None)
 
 
+@pytest.mark.full  # some seconds
 def test_lines_tell_what_was_lost_and_how_late_they_are(panda, log, tmp_path):
     """The reader has its own process and does not wait: what it has written to its record was due before."""
     kept = tmp_path / "record.csv"
@@ -455,6 +458,7 @@ def moved(panda):
 
 
 @pytest.mark.parametrize("wrong", [None, *NOT_OF_THIS_ARM])
+@pytest.mark.full  # some seconds
 def test_samples_that_cannot_be_of_this_arm_are_doubted_as_in_a_log(panda, moved, wrong):
     change, expected = NOT_OF_THIS_ARM.get(wrong, (lambda _, s: s, None))
     warned = []
@@ -639,6 +643,7 @@ def test_what_is_held_counts_as_nothing_after_a_tare(panda, analytic_log):
     session.close()
 
 
+@pytest.mark.full  # some seconds
 def test_no_tare_is_taken_while_a_payload_is_handed_over(panda, analytic_log):
     empty, loaded = (analytic_log(panda, what, duration=20.0) for what in (None, HELD))
     share = np.clip((empty.t - 8.0) / 8.0, 0.0, 1.0)[:, np.newaxis]

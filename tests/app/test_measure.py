@@ -82,6 +82,7 @@ def test_what_no_answer_could_rest_on_is_said_before_the_arm_moves(said, why, mo
     assert not logs.exists()
 
 
+@pytest.mark.full  # some seconds
 def test_a_drawing_tells_the_inertia_that_a_run_of_some_seconds_does_not(motion, tmp_path, capsys):
     held = replace(held_payload(), uncertainty=Uncertainty(mass=0.01, com=0.002, inertia=0.05))
     write_payload(tmp_path / "held.json", held)
@@ -166,6 +167,7 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_made(arguments, said, mot
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.full)])
+@pytest.mark.full  # some seconds
 def test_what_is_ended_in_the_middle_leaves_a_log_that_can_be_read(number, motion, tmp_path):
     log = tmp_path / "logs" / "empty.csv"
     command = [sys.executable, "-m", "armload", "measure", "sim", "--robot", "panda", "--motion", motion, "--move"]

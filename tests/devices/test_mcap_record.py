@@ -57,6 +57,7 @@ def live(panda, tmp_path_factory):
     return [json.loads(line) for line in lines.read_text().splitlines()], kept, log
 
 
+@pytest.mark.full  # some seconds
 def test_every_topic_has_its_standard_type_and_two_other_readers_open_it(live):
     _, path, _ = live
     with Reader(path) as bag:

@@ -669,6 +669,7 @@ def test_kill_9_of_whoever_starts_a_reader_that_connects_ends_the_reader(client,
     has_ended(int(asked.read_text()))
 
 
+@pytest.mark.full  # some seconds
 def test_a_client_that_takes_long_to_load_is_not_a_robot_that_does_not_answer(client, monkeypatch):
     client("""
         time.sleep(3.5)

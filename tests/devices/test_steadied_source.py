@@ -115,6 +115,7 @@ def logs(tmp_path_factory):
     return folder / "run.csv", folder / "empty.csv", body.mass
 
 
+@pytest.mark.full  # some seconds
 def test_a_stream_of_coarse_velocities_is_told_how_they_can_be_steadied_and_then_not_doubted(logs, capsys):
     run, empty, mass = logs
     last = {}

@@ -24,6 +24,7 @@ def bags(windows):
 
 
 @pytest.mark.parametrize("architecture", ARCHITECTURES)
+@pytest.mark.full  # some seconds
 def test_every_architecture_learns_more_than_the_mean(bags, windows, architecture):
     X, y = windows
     error = np.abs(bags[architecture].predict(X) - y).mean(axis=0)

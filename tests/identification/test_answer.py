@@ -178,6 +178,7 @@ def test_arrays_of_an_answer_are_numpy_s_and_cannot_be_written_to(answer):
 # ---------------------------------------------------------------------- what is given
 
 
+@pytest.mark.full  # some seconds
 def test_names_and_paths_stand_for_what_they_name(panda, loaded, empty, plain, tmp_path):
     write_recording(tmp_path / "run.csv", loaded)
     write_recording(tmp_path / "empty.npz", empty)
@@ -215,6 +216,7 @@ def test_a_doubted_answer_with_a_tool_is_not_called_calibrated(panda, how):
 
 
 @pytest.mark.parametrize("tared", [False, True])
+@pytest.mark.full  # some seconds
 def test_no_answer_that_no_body_can_have_is_called_calibrated(panda, loaded, empty, tared):
     found = identify(empty, panda, tare=loaded) if tared else identify(empty, panda, tool=BOX)
     assert not found.consistent

@@ -50,6 +50,7 @@ def test_a_cut_says_what_a_solution_of_its_own_with_the_same_scales_does(panda, 
     np.testing.assert_allclose(of_the_log(twice, (2.0, 3.0)).noise, scales.noise)
 
 
+@pytest.mark.full  # some seconds
 def test_a_profile_and_a_tare_beside_it_carry_the_same_and_a_sound_log_is_not_doubted(panda):
     """What was taken off a run is told by its rows, by least squares: of both it is one body."""
     profile = learn_profile(panda, [log_of(panda, seed) for seed in range(4, 8)])

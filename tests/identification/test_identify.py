@@ -123,6 +123,7 @@ def test_a_tare_with_a_tool_leaves_what_was_added_and_a_known_tool_what_it_carri
     assert alone("both", 3).mass > BOX.mass + 0.6 * TOOL.mass
 
 
+@pytest.mark.full  # some seconds
 def test_what_was_taken_off_since_the_tare_is_negative_and_said_so(panda, simulated):
     answer = identify(simulated("tool", 4), panda, tare=simulated("both", 3))
     assert answer.mass == pytest.approx(-BOX.mass, abs=0.05)
@@ -157,6 +158,7 @@ def test_gear_friction_in_the_torques_of_an_arm_that_nobody_knows_is_found_from_
     assert identify(log, stranger).phi == pytest.approx(identify(log, told).phi)
 
 
+@pytest.mark.full  # some seconds
 def test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare(real_like, simulated, alone):
     panda, how = real_like
     light = InertialParameters.from_com(0.25, (0, 0, 0.05), np.diag([2e-4] * 3))
@@ -240,6 +242,7 @@ def test_a_known_tool_that_is_not_mounted_is_missed_and_said_to_be(panda, simula
     assert "less is mounted" in answer.notes[0]
 
 
+@pytest.mark.full  # some seconds
 def test_a_known_tool_that_is_on_neither_at_the_tare_nor_in_the_log_is_said_to_be_off(panda, simulated):
     answer = identify(simulated("nothing", 3), panda, tare=simulated("nothing", 4, "tare"), tool=TOOL)
     assert answer.mass == pytest.approx(-TOOL.mass, abs=0.03)
@@ -282,6 +285,7 @@ def test_arms_as_they_are_are_not_called_strange(panda):
 
 
 @pytest.mark.parametrize("tared", [False, True])
+@pytest.mark.full  # some seconds
 def test_a_log_that_no_body_explains_is_called_so_by_the_default_method(panda, simulated, tared):
     """A kilogram whose principal moments are all negative, added through the regressor to an empty arm's torque."""
     empty, tare = simulated("nothing", 3), simulated("nothing", 4, "tare") if tared else None
@@ -352,6 +356,7 @@ def test_real_logs_have_a_body_within_the_error_bars(real_answer, log, tare, rob
 
 
 @pytest.mark.parametrize("seed", [2, 4])
+@pytest.mark.full  # some seconds
 def test_a_base_on_a_ceiling_is_said_where_a_short_log_passes_as_one_of_a_base_that_stands(seed):
     panda = arm("panda")
     hung = replace(panda, gravity=(0.0, 0.0, 9.81))
@@ -425,6 +430,7 @@ def test_the_links_of_a_real_panda_are_not_called_another_arm_s(real_answer):
 
 
 @pytest.mark.parametrize("which", [10, 18])
+@pytest.mark.full  # some seconds
 def test_friction_of_one_way_is_no_offset_of_an_arm_s_torque(which):
     """Two sound UR5e that rub more one way than the other, by up to a half of their friction."""
     robot = arm("ur5e")
@@ -465,6 +471,7 @@ def test_a_computed_torque_is_never_called_calibrated_where_gears_would_rub_in_i
         *(pytest.param(*other, marks=pytest.mark.full) for other in (("panda", [6]), ("ur10e", [3]))),
     ],
 )
+@pytest.mark.full  # some seconds
 def test_friction_that_drives_a_joint_is_told_by_the_joint(name, turned):
     """A torque with its sign turned; or all positions and velocities, which is the same for friction."""
     robot = arm(name)

@@ -111,6 +111,7 @@ TRIED += [pytest.param(*other, marks=pytest.mark.full) for other in OTHERS]  # s
 
 
 @pytest.mark.parametrize(("name", "tared", "method", "which"), TRIED)
+@pytest.mark.full  # some seconds
 def test_the_mass_is_right_whatever_the_clock_and_its_interval_holds(panda, logs, name, tared, method, which):
     change, *worst = FOUND[name]
     bound = worst[0 if tared else 1] * (1.5 if method == "map" else 1.0)
@@ -175,6 +176,7 @@ def waiting(drawn):
 
 @pytest.mark.parametrize("method", METHODS)
 @TARED
+@pytest.mark.full  # some seconds
 def test_standstill_at_the_ends_neither_moves_the_answer_nor_makes_it_surer(panda, waiting, tared, method):
     run, tare, truth = waiting
     tare = tare if tared else None
@@ -213,6 +215,7 @@ def motor_logs(panda, drawn):
 
 @pytest.mark.parametrize("method", METHODS[:2])
 @TARED
+@pytest.mark.full  # some seconds
 def test_torque_from_motor_currents_has_its_friction_found_and_wider_intervals(panda, motor_logs, tared, method):
     for run, tare, truth in motor_logs:
         answer = identify(run, panda, tare=tare if tared else None, method=method)

@@ -370,6 +370,7 @@ def test_a_base_on_a_wall_is_named_where_the_log_fits_no_payload(panda, seed, gr
     ("name", "seed", "gravity"),
     [("panda", 0, "0,0,9.81"), ("panda", 2, "0,0,9.81"), ("ur10e", 1, "0,0,9.81"), ("ur10e", 0, "9.81,0,0")],
 )
+@pytest.mark.full  # some seconds
 def test_a_base_on_a_ceiling_or_a_wall_is_not_taken_for_a_sign_a_unit_or_gravity_taken_out(name, seed, gravity):
     robot = arm(name)
     hung = mounted(robot, gravity)
@@ -594,6 +595,7 @@ def test_gravity_is_put_back_once():
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
 @pytest.mark.parametrize("name", ["ur5e", "ur10e"])
+@pytest.mark.full  # some seconds
 def test_currents_and_torque_without_gravity_are_called_so_where_their_size_says_nothing(name, seed):
     """In six seconds friction and a payload could make up any share of the arm's own torque."""
     robot = arm(name)

@@ -64,6 +64,7 @@ def test_sound_logs_of_rubbing_joints_and_noisy_velocities_are_not_called_change
     assert again >= 1  # as they were read first, they were doubted
 
 
+@pytest.mark.full  # some seconds
 def test_an_arm_that_changed_since_its_tare_is_not_explained_by_its_rubbing():
     robot = arm("panda")
     run, tare, _ = logs_of(robot, 1, 0.005, 200.0, False, changed=0.5)
@@ -74,6 +75,7 @@ def test_an_arm_that_changed_since_its_tare_is_not_explained_by_its_rubbing():
 
 
 @pytest.mark.parametrize("k", [2, pytest.param(4, marks=pytest.mark.full)])
+@pytest.mark.full  # some seconds
 def test_joints_that_rub_more_for_what_was_added_are_no_arm_that_changed_and_hide_none(k):
     """As of a stream, which is not read twice."""
     robot, found = arm("gen3"), {}
@@ -88,6 +90,7 @@ def test_joints_that_rub_more_for_what_was_added_are_no_arm_that_changed_and_hid
     assert found[0.4].changed
 
 
+@pytest.mark.full  # some seconds
 def test_real_velocities_that_are_differences_of_unsteady_positions_are_not_taken_for_another_arm(real_data):
     """Those of the KUKA jump by a fifth from sample to sample."""
     answer = identify(real_data / "kuka_lwr_100hz.csv", "iiwa14")

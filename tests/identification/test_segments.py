@@ -89,6 +89,7 @@ def test_what_was_on_at_the_tare_and_comes_off_within_a_log_is_found(panda, when
     assert found.notes[0].startswith("something was taken off since the tare")
 
 
+@pytest.mark.full  # some seconds
 def test_what_is_taken_up_shortly_before_the_end_is_found(panda, payload):
     found = identify(log_of(panda, [(0.0, None), (5.2, payload)]), panda)
     assert [part.start for part in found.segments] == [0.0, pytest.approx(5.2, abs=0.1)]
@@ -121,6 +122,7 @@ def test_a_light_thing_taken_up_is_doubted_by_its_mass_and_a_sound_log_is_not(pa
 
 
 @pytest.mark.parametrize("tared", [True, pytest.param(False, marks=pytest.mark.full)], ids=["tared", "untared"])
+@pytest.mark.full  # some seconds
 def test_a_change_in_a_log_of_motor_currents_does_not_hide_itself(tared):
     """What it leaves unexplained looks like an arm unlike its model, of which more would be allowed."""
     robot, payload = arm("ur10e"), draw_payload("boxes", 4, 2.0)
@@ -143,6 +145,7 @@ def drifting(log, robot, share, seed):
 
 @pytest.mark.parametrize("name", ["panda", pytest.param("ur10e", marks=pytest.mark.full)])
 @pytest.mark.parametrize("tared", [True, pytest.param(False, marks=pytest.mark.full)], ids=["tared", "untared"])
+@pytest.mark.full  # some seconds
 def test_torques_that_drift_are_no_change_of_payload(name, tared):
     """And the joint that drifts most, of its effort limit, is named with what it drifts by."""
     robot, payload = arm(name), draw_payload("boxes", 4, 1.5)
@@ -164,6 +167,7 @@ def test_torques_that_drift_are_no_change_of_payload(name, tared):
 
 
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
+@pytest.mark.full  # some seconds
 def test_a_payload_that_is_taken_up_while_torques_drift_a_little_is_a_change(name):
     robot, payload = arm(name), draw_payload("boxes", 4, 1.5)
     how = {"world": World.real_like(robot, 504), "sensors": Sensors.of(robot), "rate": 200.0}
@@ -181,6 +185,7 @@ def test_a_payload_that_is_taken_up_while_torques_drift_a_little_is_a_change(nam
     [pytest.param(1, 0.3, (0.5, 1.0), 0.0, marks=pytest.mark.full), (3, 0.2, (1.0,), 0.02), (1, 1.0, (0.3,), 0.02)],
     ids=["in two steps", "beside a drift", "beside a drift that is larger"],
 )
+@pytest.mark.full  # some seconds
 def test_a_change_that_no_drift_alone_explains_is_found(panda, seed, size, held, share):
     """In a small motion a payload's torque is much like an offset, and one taken up in steps like a ramp."""
     body, motion = draw_payload("boxes", seed, 1.0).parameters, random_motion(panda, 40 + seed)
@@ -269,6 +274,7 @@ def answer(capsys, *arguments):
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.full  # some seconds
 def test_a_weighed_mass_is_in_the_answer_and_one_that_the_log_contradicts_is_said(files, capsys):
     truth = draw_payload("boxes", 3, MASS).parameters.mass
     log, tare = files / "loaded.csv", files / "empty.csv"

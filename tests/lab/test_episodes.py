@@ -64,6 +64,7 @@ def test_an_episode_s_logs_are_the_simulations_of_its_parts(panda):
         assert np.abs(tare.q[0] - episode.tare_motion([0.0])[0]).max() < 0.02
 
 
+@pytest.mark.full  # some seconds
 def test_processes_give_what_one_process_gives(panda):
     drawn = [replace(e, **SHORT) for e in draw_episodes(panda, "reference", 10, seed=2, motions=2)]
     one, two = (list(simulate_episodes(drawn, rate=100.0, workers=w)) for w in (1, 2))

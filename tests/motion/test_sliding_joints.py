@@ -125,6 +125,7 @@ def test_an_arm_that_turns_alone_has_no_metres(panda, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("name", "seed"), [("panda", 3), ("ur10e", 0), ("iiwa14", 1)])
+@pytest.mark.full  # some seconds
 def test_no_curve_passes_where_the_number_of_a_limit_is_written(name, seed):
     """A curve that is highest or lowest at the end of its motion, far from the limit."""
     of = arm(name)

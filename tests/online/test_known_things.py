@@ -38,6 +38,7 @@ def said(log, known):
     return estimates
 
 
+@pytest.mark.full  # some seconds
 def test_a_weighed_mass_is_taken_while_it_may_be_held_and_claimed_of_nothing_else(log):
     known = Known.of((MASS, 2e-3), (COM, 2e-3), if_held=True)
     plain, told = said(log.between(0.0, 6.0), None), said(log, known)

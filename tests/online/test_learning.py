@@ -131,6 +131,7 @@ def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profil
 
 
 @pytest.mark.parametrize("found", [True, False])
+@pytest.mark.full  # some seconds
 def test_an_end_says_once_that_the_arm_is_not_its_profile_s(panda, world, profile, monkeypatch, found):
     verdicts = iter([True, found])  # while the stream goes on, and at its end
     monkeypatch.setattr(checked_solver, "FROM", 3.0)

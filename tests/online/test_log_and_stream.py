@@ -94,6 +94,7 @@ def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, 
 
 
 @pytest.mark.parametrize("method", [None, "map-gp"])
+@pytest.mark.full  # some seconds
 def test_a_field_means_the_same_in_a_stream_s_json_and_in_a_log_s(method, panda_logs):
     """A standing arm first, whose inertia is not determined; then a log that no body explains."""
     robot, run, _ = panda_logs

@@ -41,6 +41,7 @@ def _told(robot, log, tare):
 
 
 @pytest.mark.parametrize(("name", "seed"), [("ur5e", 54007), ("xarm7", 54000), ("xarm7", 54007)])
+@pytest.mark.full  # some seconds
 def test_an_empty_arm_that_starts_from_rest_is_no_change_of_payload(name, seed):
     estimates = _told(*_starting(name, seed))
     assert estimates[-1].event is None
@@ -66,6 +67,7 @@ def _stopping(name: str, seed: int):
 
 
 @pytest.mark.parametrize(("name", "seed"), [pytest.param("ur10e", 57004, marks=pytest.mark.full), ("ur5e", 57000)])
+@pytest.mark.full  # some seconds
 def test_joints_that_keep_their_friction_at_a_stop_are_no_change_of_payload(name, seed):
     estimates = _told(*_stopping(name, seed))
     assert {one.event for one in estimates} == {None}

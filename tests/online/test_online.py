@@ -124,6 +124,7 @@ def bad_samples(n=7):
 
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(bad=bad_samples(), where=st.integers(1, 59))
+@pytest.mark.full  # some seconds
 def test_samples_that_are_none_leave_no_trace(panda, log, clean, bad, where):
     """Bit for bit: the estimate after a stream with garbage in it is the one after the stream without."""
     samples = list(log)[:60]
@@ -183,6 +184,7 @@ def test_swapped_joints_are_left_out(online, log):
 
 
 @pytest.mark.parametrize("counted_from", [0.0, -np.pi])
+@pytest.mark.full  # some seconds
 def test_a_joint_that_turns_without_end_may_be_counted_anew(counted_from):
     """Kinova's drivers tell its angles from -pi to pi, or from 0 to 2 pi."""
     gen3, t, endless = arm("gen3"), np.arange(600) / 200.0, [0, 2, 4, 6]
@@ -224,6 +226,7 @@ def test_repeated_and_late_samples_count_once(online, log, clean):
 
 
 @pytest.mark.parametrize("jump", [-3600.0, -2.0, 1e9])
+@pytest.mark.full  # some seconds
 def test_a_clock_that_is_set_anew_costs_nothing_but_a_pause(online, log, jump):
     samples = list(log)
     truth = make_payload().parameters.mass
@@ -379,6 +382,7 @@ def test_any_method_of_the_catalogue_runs_beside_a_robot(panda, log, method):
 
 @pytest.mark.parametrize("cut", [7, 30, 300])
 @pytest.mark.parametrize("method", [None, "map", "rls-filter"])
+@pytest.mark.full  # some seconds
 def test_a_saved_state_goes_on_exactly(panda, log, tmp_path, method, cut):
     samples = list(log)[:400]
     identifier = OnlineIdentifier(panda, method=method)

@@ -108,6 +108,7 @@ def test_half_a_kilo_is_noticed_in_a_third_of_a_second_and_its_mass_known_in_one
     assert after.since > 5.0
 
 
+@pytest.mark.full  # some seconds
 def test_fewer_answers_find_the_same_changes_at_the_same_times():
     log = stream(1, [(3.0, HALF_KILO), (4.5, None)], 6.0)
     estimates, events = said(log)
@@ -454,6 +455,7 @@ def near(method="map-gp"):
     return *said(stream(26, [(5.0, box(0.39)), (10.0, None), (15.0, other)], 24.0), method), other
 
 
+@pytest.mark.full  # some seconds
 def test_a_payload_that_weighs_nearly_the_same_is_not_taken_for_the_earlier_one():
     estimates, events, other = near()
     late = [e for e in estimates if e.t > 15.5]
@@ -462,6 +464,7 @@ def test_a_payload_that_weighs_nearly_the_same_is_not_taken_for_the_earlier_one(
     assert [(event.kind, round(event.t)) for event in events] == [("grasp", 5), ("return", 10), ("grasp", 15)]
 
 
+@pytest.mark.full  # some seconds
 def test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change(monkeypatch):
     monkeypatch.setattr("armload.online.runs.RETURN_SHARE", 1.0)
     estimates, events, other = near()

@@ -65,6 +65,7 @@ def followed(sticks, seed=11):
 
 
 @pytest.mark.parametrize("seed", [11, pytest.param(14, marks=pytest.mark.full)])
+@pytest.mark.full  # some seconds
 def test_joints_that_stick_are_no_change_of_payload_and_hide_none(seed):
     estimates, noticed, mass, changes = followed(True, seed)
     assert len(noticed) == len(changes)
@@ -74,6 +75,7 @@ def test_joints_that_stick_are_no_change_of_payload_and_hide_none(seed):
     assert np.mean([e.calibrated for e in estimates]) > 0.4  # 0.80 and 0.49; 0.49 and 0.13 if no joint may stick
 
 
+@pytest.mark.full  # some seconds
 def test_joints_that_do_not_stick_are_not_thought_to():
     """Their answers are as sharp half a second after a change at rest as if none ever stuck."""
     estimates, noticed, _, changes = followed(False)

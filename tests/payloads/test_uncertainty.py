@@ -64,6 +64,7 @@ def test_an_uncertainty_that_is_none_is_refused(tmp_path, std, said):
 
 
 @pytest.mark.parametrize("tared", [False, True])
+@pytest.mark.full  # some seconds
 def test_an_answer_is_as_uncertain_as_its_tool(analytic_log, tared):
     panda, hand = arm("panda"), franka_hand()
     body = InertialParameters.from_com(1.0, COM, 1e-3 * np.eye(3))

@@ -277,6 +277,7 @@ def test_an_arm_with_other_joints_is_refused():
 
 
 @pytest.mark.parametrize(("constant", "finer"), [("_RATE", 100.0), ("_FEATURES", (64, 8))])
+@pytest.mark.full  # some seconds
 def test_the_joint_named_is_that_of_a_finer_comparison(panda, monkeypatch, constant, finer):
     motions = []
     for seed in range(3):

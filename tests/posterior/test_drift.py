@@ -163,6 +163,7 @@ def test_a_stream_that_is_concluded_doubts_an_old_tare_as_a_log_does(panda, old)
     assert said.phi == pytest.approx(whole.phi, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.full  # some seconds
 def test_a_stream_says_within_seconds_that_its_tare_is_old_and_nothing_of_a_sound_one(panda, sound):
     """Three of four old ones at least say so within six seconds; none of them is believed after five."""
 

@@ -491,6 +491,7 @@ def test_another_payload_frame_describes_the_same_body(panda, logs, estimates):
     assert there.phi == pytest.approx(moved.phi, abs=2e-4)  # the weak priors of either frame differ
 
 
+@pytest.mark.full  # some seconds
 def test_what_was_taken_off_since_the_tare_is_negative(panda):
     body, motion = random_payloads(1, seed=3)[0], random_motion(panda, 5)
     other = random_motion(panda, 6, duration=12.0, around=motion([0.0])[0][0])

@@ -178,6 +178,7 @@ def inside(low, held, high):
 
 
 @pytest.mark.parametrize("method", [None, "map-gp"])
+@pytest.mark.full  # some seconds
 def test_a_drawing_tells_what_a_log_does_not_and_a_tray_is_not_held_against_what_is_usual(tray, method):
     held, log, tare, panda = tray
     plain = identify(log, panda, tare=tare, method=method)
@@ -223,6 +224,7 @@ def test_a_drawing_of_which_nobody_says_how_well_it_is_known_is_refused(tray, bo
         identify(log, panda, tare=tare, body=body)
 
 
+@pytest.mark.full  # some seconds
 def test_a_family_is_believed_until_the_log_denies_it(tray):
     held, log, tare, panda = tray
     families = (), "wide", ("container", "tools")
@@ -236,6 +238,7 @@ def test_a_family_is_believed_until_the_log_denies_it(tray):
 
 
 @pytest.mark.parametrize("family", ["nothing", "light"])
+@pytest.mark.full  # some seconds
 def test_a_family_that_the_log_denies_says_nothing_of_what_is_undetermined_either(tray, family):
     _, log, tare, panda = tray
     plain, denied = identify(log, panda, tare=tare), identify(log, panda, tare=tare, family=family)

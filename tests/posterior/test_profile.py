@@ -137,6 +137,7 @@ def test_a_session_that_is_added_is_held_against_the_drift_of_all_as_those_befor
     assert grown.sessions[-1].statistic <= 3 * panda.n * (len(grown.sessions) + 3)
 
 
+@pytest.mark.full  # some seconds
 def test_of_many_sessions_those_beyond_a_number_are_added_one_by_one(panda, life, profile, monkeypatch):
     """So that memory stays bounded: what is known agrees within a third of its deviation, whatever the logs' order."""
     monkeypatch.setattr(profile_learning, "AT_ONCE", 4)
@@ -204,6 +205,7 @@ def test_a_file_of_which_a_byte_is_another_is_refused(young, tmp_path, where):
 
 
 @pytest.mark.parametrize(("loaded", "mass"), [((2,), 0.5), pytest.param((0, 2, 4), 1.0, marks=pytest.mark.full)])
+@pytest.mark.full  # some seconds
 def test_a_payload_in_some_of_the_logs_is_told_and_no_profile_is_made_of_them(panda, life, loaded, mass):
     """Taken for the arm's, half of it would be missing in every answer."""
     episode, logs, _ = life

@@ -150,6 +150,7 @@ def test_what_is_foreseen_of_a_row_is_the_innovation_of_its_first_joint_if_it_is
 
 
 @pytest.mark.parametrize("tared", [False, True])
+@pytest.mark.full  # some seconds
 def test_the_running_answer_is_near_the_concluded_one(panda, log, tare, tared):
     times = (0.02, 0.1, 0.5, 2.4)
     before = tare if tared else None

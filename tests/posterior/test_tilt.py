@@ -89,6 +89,7 @@ def test_a_base_that_leans_is_found_and_answered_for(panda, leaning):
         assert np.all(np.abs(answer.phi - told.phi)[:4] < 0.5 * half[:4])
 
 
+@pytest.mark.full  # some seconds
 def test_a_base_that_leans_is_found_without_a_tare(panda):
     (log,) = logs_of(panda, panda.leaning(ANGLES), "untared", 1)
     answer = identify(log.run, panda)

@@ -93,6 +93,7 @@ def test_a_weight_that_is_none_or_that_the_log_does_not_bear_is_refused(panda, l
         with_known_weight(profile, panda, logs[4], mass, std)
 
 
+@pytest.mark.full  # some seconds
 def test_a_weight_by_which_all_joints_are_off_alike_is_to_be_weighed_again(weighed):
     """Joints' sensors are off by some per cent, and not all by the same: 9 % of all is the weight's."""
     assert common_gain(weighed) is None

@@ -13,6 +13,7 @@ from armload.runtime import kernels
 PACKAGE = Path(armload.__file__).parent
 
 
+@pytest.mark.full  # some seconds
 def test_every_kernel_that_python_calls_is_compiled_for_a_wheel():
     trees = {
         "armload." + path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): ast.parse(path.read_text())

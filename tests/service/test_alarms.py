@@ -166,6 +166,7 @@ def test_a_message_that_will_never_be_taken_holds_up_no_other(receiver):
 
 
 @pytest.mark.parametrize("code", [301, 302, 303, 307, 308])
+@pytest.mark.full  # some seconds
 def test_a_receiver_that_has_moved_is_said_and_no_alarm_is_lost_to_it(receiver, caplog, code):
     url, taken, codes = receiver
     codes[:] = [code]

@@ -60,6 +60,7 @@ def test_an_address_or_a_folder_that_cannot_be_used_is_said_before_anything_begi
         ("ur://127.0.0.1", "ur5", "rtde_receive", "no torque constants are known for it"),
     ],
 )
+@pytest.mark.full  # some seconds
 def test_a_robot_that_can_never_be_read_here_is_not_waited_for(
     monkeypatch, tmp_path, capsys, source, robot, module, said
 ):

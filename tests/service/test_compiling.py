@@ -41,6 +41,7 @@ def test_functions_are_compiled_while_any_thread_compiles_one_and_a_moment_longe
     assert not compiling.compiling()
 
 
+@pytest.mark.full  # some seconds
 def test_a_process_that_compiles_after_its_first_answer_speaks_on(panda, analytic_log, tmp_path, compilations):
     write_recording(tmp_path / "run.csv", analytic_log(panda, test_payload().parameters, duration=4.0))
     settings = ArmSettings(name="left", source=str(tmp_path / "run.csv"), robot="panda", method="map")

@@ -326,6 +326,7 @@ def test_an_error_ends_a_service_only_if_an_arm_cannot_begin(monkeypatch, stoppe
 
 
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
+@pytest.mark.full  # some seconds
 def test_a_full_disk_under_its_output_ends_no_service(cell, stream):
     """The endpoint, and who reads it, need neither."""
     if not Path("/dev/full").exists():
@@ -359,6 +360,7 @@ def free_port():
         return server.getsockname()[1]
 
 
+@pytest.mark.full  # some seconds
 def test_what_a_killed_save_has_left_is_gone_once_the_next_service_answers(serve, cell, tmp_path):
     path = cell("left")
     first = serve(path)

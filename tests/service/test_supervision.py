@@ -77,6 +77,7 @@ def test_what_an_arm_cannot_begin_with_ends_the_service_at_first_and_is_tried_ag
     assert "there is no tare" in again.answer("left")["why"]
 
 
+@pytest.mark.full  # some seconds
 def test_a_process_that_is_started_again_may_take_as_long_as_the_first_until_its_first_line(running, monkeypatch):
     monkeypatch.setattr(service, "HUNG", 0.3)
     _, starts = running(f"time.sleep(1.0)\nprint({LINE}, flush=True)\nsys.exit(3)")
@@ -84,6 +85,7 @@ def test_a_process_that_is_started_again_may_take_as_long_as_the_first_until_its
     assert all(b - a > 0.9 for a, b in pairwise(starts))  # none was ended before it spoke
 
 
+@pytest.mark.full  # some seconds
 def test_why_a_source_is_lost_stands_once_in_the_log_and_in_its_alarm(running, noted):
     lost = f"""line = {{**{LINE.removeprefix("json.dumps(").removesuffix(")")}, "connection": "lost"}}
 print(json.dumps({{"note": "sim was lost: gone; it is opened again in 0.1 s"}}), flush=True)

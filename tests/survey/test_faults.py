@@ -52,6 +52,7 @@ def whole(logs, tmp_path_factory):
     return survey([str(logs)], SETTINGS, tmp_path_factory.mktemp("whole") / "survey.json", jobs=1).rows
 
 
+@pytest.mark.full  # some seconds
 def test_logs_in_an_object_store_are_answered_as_those_on_disk_and_once(logs, whole, tmp_path):
     fsspec = pytest.importorskip("fsspec")
     store = fsspec.filesystem("memory")
@@ -111,6 +112,7 @@ def web(share):
 
 
 @pytest.mark.parametrize("silent", [False, True], ids=["that says what changed", "that says nothing"])
+@pytest.mark.full  # some seconds
 def test_logs_behind_a_web_server_are_answered_as_those_on_disk_and_once(web, share, whole, tmp_path, silent):
     urls, handler = web
     handler.silent = silent
@@ -166,6 +168,7 @@ def test_a_log_that_does_not_fit_in_memory_is_asked_again_and_is_no_bug(share, w
     assert answers(again.rows) == answers(whole)
 
 
+@pytest.mark.full  # some seconds
 def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp_path):
     out = tmp_path / "survey.json"
     most = 4000  # bytes of a file: cells of a log fit, the table of all three does not

@@ -154,6 +154,7 @@ def test_where_some_logs_have_no_date_all_are_in_order_on_one_axis(rows):
 
 
 @pytest.mark.parametrize("days", [0.004, 0.08, 2.4, 70.0, 800.0])
+@pytest.mark.full  # some seconds
 def test_dates_of_any_span_are_drawn_without_a_warning_and_apart(rows, days):
     first, *_, last = (one for one in rows if one["arm"] == "sound" and one["status"] == "answered")
     several = [

@@ -95,6 +95,7 @@ def test_files_in_an_object_store_that_may_be_logs_are_named_too():
 
 
 @pytest.mark.parametrize("form", ["csv", "json", "parquet"])
+@pytest.mark.full  # some seconds
 def test_logs_that_leave_a_table_are_named_before_it_is_replaced(logs, tmp_path, form):
     out = tmp_path / f"out.{form}"
     assert not any("leaves" in line for line in said_of([logs], out)[1])
@@ -126,6 +127,7 @@ def test_a_damaged_table_with_its_cells_is_written_anew(logs, tmp_path):
         assert out.read_bytes() == whole
 
 
+@pytest.mark.full  # some seconds
 def test_copies_of_a_log_are_said_to_be_there_and_broken_files_are_none(logs, tmp_path):
     shutil.copy(logs / "0.csv", logs / "copy of 0.csv")
     (logs / "link.csv").symlink_to("1.csv")

@@ -75,6 +75,7 @@ def rows_of(out, fleet):
     return found
 
 
+@pytest.mark.full  # some seconds
 def test_there_is_a_row_for_each_payload_and_its_mass_is_the_true_one(surveyed, fleet):
     rows = rows_of(surveyed, fleet)
     assert [row["held"] for row in rows["a/taken.parquet"]] == [False, True]
