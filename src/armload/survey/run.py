@@ -18,7 +18,7 @@ from typing import Any
 from armload.errors import UsageError
 from armload.identification.choice import choose
 from armload.identification.methods import METHODS
-from armload.lab.cells import load_cells
+from armload.lab.cells import load_cells, of_damaged
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
 from armload.survey.logs import Log, cells_of, find_logs
@@ -97,7 +97,9 @@ def survey(
     settings.mounted()
     _check_method(settings)
     count = "1 log" if len(logs) == 1 else f"{len(logs)} logs"
-    before = load_cells(folder)
+    before = load_cells(folder, damaged := [])
+    if damaged:
+        say(of_damaged(damaged))
     # what was answered once may be away for a while: its row says so
     if not any(log.there or _name(log) in before for log in logs):
         raise UsageError(f"{', '.join(paths)}: no such file or folder: expected logs, folders, globs or URLs")
