@@ -141,9 +141,7 @@ def test_a_damaged_cell_is_said_to_be_one_and_measured_again(tmp_path):
     (tmp_path / "cells" / "of-1.json").write_text('{"name": "of-')
     messages = []
     assert run_tasks(tasks(tmp_path, 2), tmp_path / "cells", say=messages.append) == first
-    assert messages[0] == (
-        f"1 file is no whole cell ({tmp_path}/cells/of-1.json): what is missing is measured again"
-    )
+    assert messages[0] == (f"1 file is no whole cell ({tmp_path}/cells/of-1.json): what is missing is measured again")
     assert calls(tmp_path) == ["0", "1", "1"]
     assert list(load_cells(tmp_path / "cells")) == ["of-0", "of-1"]
 

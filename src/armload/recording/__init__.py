@@ -1,6 +1,7 @@
 """Recordings: what a robot's joints did, the files they come in, and whether their data are valid."""
 
 from armload.recording.alignment import Alignment, same_motion
+from armload.recording.bag_parts import is_part_of_bag
 from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import arm_as_set, with_gravity
@@ -45,6 +46,7 @@ __all__ = [
     "has_topics",
     "is_data_set",
     "is_log",
+    "is_part_of_bag",
     "largest",
     "mark_of",
     "marks_of",
