@@ -220,6 +220,41 @@ def test_a_lost_arm_is_said_with_what_was_recorded(panda, simulated, tmp_path):
     assert len(read_recording(tmp_path / "loaded.csv", panda)) == 99
 
 
+class Broken(SimulatedMover):
+    """Its samples end on the way with the payload, or from there on all have one time."""
+
+    def __init__(self, *arguments, ends, **settings):
+        super().__init__(*arguments, **settings)
+        self.samples, self.ends = self._samples, ends
+        self._samples = self.broken()
+        self.movements = 0
+
+    def follow(self, motion, thresholds=None):
+        super().follow(motion, thresholds)
+        self.movements, self.count = self.movements + 1, 0
+
+    def broken(self):
+        stood = None
+        for sample in self.samples:
+            self.count = self.count + 1 if self.movements == 2 else 0
+            if self.count > 100 and self.ends:
+                return
+            stood = sample.t if self.count == 100 else stood
+            yield sample if stood is None else sample._replace(t=stood)
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [(True, "ended while the arm was on its way"), (False, "has stood still for 1 s while the arm was on its way")],
+    ids=["the samples end", "their clock stands still"],
+)
+def test_a_movement_whose_end_was_not_seen_is_never_taken_for_a_whole_one(panda, simulated, tmp_path, ends, said):
+    mover, orders = simulated(kind=Broken, ends=ends), Orders()
+    with pytest.raises(SourceError, match=rf"{said}: .*; what was recorded until then is in .*loaded.csv"):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
+    assert len(read_recording(tmp_path / "loaded.csv", panda)) == 100
+
+
 def test_an_arm_moved_meanwhile_is_asked_for_anew(panda, simulated, tmp_path):
     mover, orders = simulated(), Orders()
     procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP)
