@@ -12,6 +12,7 @@ from armload.recording.files import (
     PACKED_SUFFIXES,
     has_topics,
     is_log,
+    log_in,
     read_recording,
     write_recording,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "is_log",
     "is_part_of_bag",
     "largest",
+    "log_in",
     "mark_of",
     "marks_of",
     "parts_of",

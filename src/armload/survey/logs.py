@@ -18,7 +18,15 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from armload.errors import ArmloadError, UsageError
-from armload.recording import LOG_SUFFIXES, data_set_episodes, is_data_set, is_log, is_part_of_bag
+from armload.recording import (
+    LOG_SUFFIXES,
+    PACKED_SUFFIXES,
+    data_set_episodes,
+    is_data_set,
+    is_log,
+    is_part_of_bag,
+    log_in,
+)
 from armload.recording.bag_parts import PART_SUFFIXES
 from armload.survey.remarks import may_be_log, of_passed
 from armload.survey.stores import WILD, is_url, logs_in, stamp_of
@@ -70,6 +78,20 @@ class Log:
         if self.remote:
             return self.stamp()
         return hashlib.sha256("".join(file_hash(file) for file in self.files).encode()).hexdigest()
+
+    @property
+    def packed(self) -> bool:
+        """Whether it is a packed file on this machine."""
+        return not self.remote and len(self.files) == 1 and self.files[0].suffix.lower() in PACKED_SUFFIXES
+
+    def unpacked(self) -> str:
+        """Of a packed log, the `content` that it has unpacked.
+
+        Raises:
+            RecordingError: it cannot be unpacked. OSError: a file cannot be read.
+        """
+        with log_in(self.files[0]) as plain:
+            return hashlib.sha256(file_hash(plain).encode()).hexdigest()
 
 
 def cells_of(table: str | Path) -> Path:

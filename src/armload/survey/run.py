@@ -118,7 +118,8 @@ def survey(
     )
     of_each = [cells.get(task.name) or before[task.name] for task in tasks]
     answered = [(log, cell) for log, cell in zip(logs, of_each, strict=True) if cell["rows"][0]["status"] != UNUSABLE]
-    if remark := of_copies((log.name, log.episode, cell["content"]) for log, cell in answered):
+    # a cell of an earlier version knows its content as it is packed only
+    if remark := of_copies((log.name, log.episode, cell.get("unpacked", cell["content"])) for log, cell in answered):
         say(remark)
     rows = [row for cell in of_each for row in cell["rows"]]
     rows.sort(key=lambda row: (row["log"], -1 if row["episode"] is None else row["episode"], row.get("part") or 0))
