@@ -20,6 +20,7 @@ from armload.motion.point_to_point import PointToPoint
 from armload.payloads import test_payload as held_payload
 from armload.posterior import KnownMass
 from armload.recording import Sample, read_recording
+from armload.recording.growing_file import GrowingFile
 from armload.simulation import Sensors, World
 
 WHOLE = taie2024()
@@ -217,6 +218,18 @@ def test_a_lost_arm_is_said_with_what_was_recorded(panda, simulated, tmp_path):
     mover, orders = simulated(kind=Restless, do=lose), Orders()
     with pytest.raises(SourceError, match=r"the arm was lost; what was recorded until then is in .*loaded.csv"):
         Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
+    assert len(read_recording(tmp_path / "loaded.csv", panda)) == 99
+
+
+def test_an_arm_whose_log_cannot_grow_is_stopped_and_what_was_kept_can_be_read(panda, simulated, tmp_path, monkeypatch):
+    def full(*_):
+        raise RecordingError("the disk is full")
+
+    mover, orders = simulated(kind=Restless, do=lambda _: monkeypatch.setattr(GrowingFile, "append", full)), Orders()
+    with pytest.raises(RecordingError, match=r"^the disk is full; the arm was stopped on its way with the payload: "):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
+    assert not mover.moving
+    assert np.ptp(poses(mover), axis=0).max() < 0.01
     assert len(read_recording(tmp_path / "loaded.csv", panda)) == 99
 
 
