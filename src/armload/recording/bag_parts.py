@@ -1,4 +1,4 @@
-"""The files of a ROS 2 bag by their names, where its metadata.yaml is lost: NAME/NAME_0.mcap, NAME/NAME_1.mcap, …"""
+"""The files of a ROS 2 bag by their names, NAME/NAME_0.mcap, NAME/NAME_1.mcap, …, where its metadata.yaml is lost."""
 
 from __future__ import annotations
 
