@@ -62,6 +62,17 @@ def test_the_whole_way_prints_and_writes_the_answer(motion, tmp_path, capsys):
     assert [os.path.basename(said["measurement"][log]) for log in ("empty", "loaded")] == ["empty.csv", "loaded.csv"]
 
 
+def test_an_answer_that_cannot_be_written_any_more_is_printed_all_the_same(motion, tmp_path, capfd):
+    out = tmp_path / "answers" / "answer.json"
+    out.parent.mkdir()
+    arguments = ["--motion", motion, "--move", "--dir", str(tmp_path / "logs"), "--out", str(out), "--json"]
+    assert main(["measure", "sim", *QUICK, *arguments, "--grip", f"rmdir '{out.parent}'"]) == 2
+    said, notes = capfd.readouterr()
+    assert json.loads(said)["relative_to"] == "tare"
+    assert f"{out} cannot be written" in notes.splitlines()[-1]
+    assert f"{tmp_path}/logs/loaded.csv" in notes.splitlines()[-2]
+
+
 @pytest.mark.parametrize(
     ("said", "why"),
     [

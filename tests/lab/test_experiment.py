@@ -136,6 +136,16 @@ def test_what_a_kill_leaves_of_a_file_is_no_cell(tmp_path):
     assert list(load_cells(tmp_path / "cells")) == ["of-0"]
 
 
+def test_a_damaged_cell_is_said_to_be_one_and_measured_again(tmp_path):
+    first = run_tasks(tasks(tmp_path, 2), tmp_path / "cells")
+    (tmp_path / "cells" / "of-1.json").write_text('{"name": "of-')
+    messages = []
+    assert run_tasks(tasks(tmp_path, 2), tmp_path / "cells", say=messages.append) == first
+    assert messages[0] == (f"1 file is no whole cell ({tmp_path}/cells/of-1.json): what is missing is measured again")
+    assert calls(tmp_path) == ["0", "1", "1"]
+    assert list(load_cells(tmp_path / "cells")) == ["of-0", "of-1"]
+
+
 @pytest.mark.full
 def test_dask_workers_give_the_cells_of_one_process_and_a_lost_one_costs_its_task_only(tmp_path):
     pytest.importorskip("distributed")

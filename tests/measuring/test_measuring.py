@@ -20,6 +20,7 @@ from armload.motion.point_to_point import PointToPoint
 from armload.payloads import test_payload as held_payload
 from armload.posterior import KnownMass
 from armload.recording import Sample, read_recording
+from armload.recording.growing_file import GrowingFile
 from armload.simulation import Sensors, World
 
 WHOLE = taie2024()
@@ -218,6 +219,53 @@ def test_a_lost_arm_is_said_with_what_was_recorded(panda, simulated, tmp_path):
     with pytest.raises(SourceError, match=r"the arm was lost; what was recorded until then is in .*loaded.csv"):
         Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
     assert len(read_recording(tmp_path / "loaded.csv", panda)) == 99
+
+
+def test_an_arm_whose_log_cannot_grow_is_stopped_and_what_was_kept_can_be_read(panda, simulated, tmp_path, monkeypatch):
+    def full(*_):
+        raise RecordingError("the disk is full")
+
+    mover, orders = simulated(kind=Restless, do=lambda _: monkeypatch.setattr(GrowingFile, "append", full)), Orders()
+    with pytest.raises(RecordingError, match=r"^the disk is full; the arm was stopped on its way with the payload: "):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
+    assert not mover.moving
+    assert np.ptp(poses(mover), axis=0).max() < 0.01
+    assert len(read_recording(tmp_path / "loaded.csv", panda)) == 99
+
+
+class Broken(SimulatedMover):
+    """Its samples end on the way with the payload, or from there on all have one time."""
+
+    def __init__(self, *arguments, ends, **settings):
+        super().__init__(*arguments, **settings)
+        self.samples, self.ends = self._samples, ends
+        self._samples = self.broken()
+        self.movements = 0
+
+    def follow(self, motion, thresholds=None):
+        super().follow(motion, thresholds)
+        self.movements, self.count = self.movements + 1, 0
+
+    def broken(self):
+        stood = None
+        for sample in self.samples:
+            self.count = self.count + 1 if self.movements == 2 else 0
+            if self.count > 100 and self.ends:
+                return
+            stood = sample.t if self.count == 100 else stood
+            yield sample if stood is None else sample._replace(t=stood)
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [(True, "ended while the arm was on its way"), (False, "has stood still for 1 s while the arm was on its way")],
+    ids=["the samples end", "their clock stands still"],
+)
+def test_a_movement_whose_end_was_not_seen_is_never_taken_for_a_whole_one(panda, simulated, tmp_path, ends, said):
+    mover, orders = simulated(kind=Broken, ends=ends), Orders()
+    with pytest.raises(SourceError, match=rf"{said}: .*; what was recorded until then is in .*loaded.csv"):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
+    assert len(read_recording(tmp_path / "loaded.csv", panda)) == 100
 
 
 def test_an_arm_moved_meanwhile_is_asked_for_anew(panda, simulated, tmp_path):

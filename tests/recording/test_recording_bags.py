@@ -236,6 +236,17 @@ def test_a_split_bag_is_read_in_order(tmp_path, panda):
     np.testing.assert_array_equal(read_recording(whole, panda).q, [m[3] for m in sent])
 
 
+@pytest.mark.parametrize("kind", ["db3", "mcap"])
+def test_a_split_bag_of_more_than_ten_parts_without_metadata_is_read_in_order(tmp_path, panda, kind):
+    whole = tmp_path / "split"
+    whole.mkdir()
+    sent = samples(rows=24)
+    for k in range(12):
+        part = write_bag(tmp_path, kind, {"/joint_states": sent[2 * k : 2 * k + 2]}, name=f"part{k}")
+        shutil.copy(storage(part), whole / f"split_{k}.{kind}")
+    np.testing.assert_array_equal(read_recording(whole, panda).q, [m[3] for m in sent])
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.7])
 def test_a_bag_cut_off_is_refused(tmp_path, panda, kind, share):

@@ -188,6 +188,22 @@ def test_a_full_disk_is_said_and_the_survey_goes_on_from_there(share, whole, tmp
     assert len(kept) == 3
 
 
+@pytest.mark.parametrize("left", [b"", b'{"name": "0', b"\xff\x00", b"[]"], ids=["no", "half", "noise", "list"])
+def test_a_damaged_cell_is_named_and_its_log_alone_is_answered_again(share, whole, tmp_path, left):
+    out = tmp_path / "survey.json"
+    survey([str(share)], SETTINGS, out, jobs=1)
+    cell = sorted(cells_of(out).glob("*.json"))[0]
+    cell.write_bytes(left)
+    said: list[str] = []
+    again = survey([str(share)], SETTINGS, out, jobs=1, say=said.append)
+    assert again.anew == 1
+    assert answers(again.rows) == answers(whole)
+    assert [line for line in said if cell.name in line] == [
+        f"1 file is no whole cell ({cell}): what is missing is measured again"
+    ]
+    assert survey([str(share)], SETTINGS, out, jobs=1).anew == 0
+
+
 @pytest.mark.full  # some seconds
 def test_a_share_that_vanishes_costs_no_row_once_it_is_back(share, whole, tmp_path):
     out = tmp_path / "survey.json"

@@ -112,6 +112,29 @@ def test_a_bag_is_one_log_and_a_data_set_one_for_each_episode(folder):
     assert [log.files[1].name for log in episodes] == ["episode_000000.parquet", "episode_000001.parquet"]
 
 
+def test_a_bag_without_its_metadata_is_one_log_of_the_arm_that_it_lies_with(folder):
+    (folder / "cell-1" / "run").mkdir()
+    for name in ("run_0.mcap", "run_1.mcap", "notes.md"):
+        (folder / "cell-1" / "run" / name).write_text("x")
+    found = find_logs([str(folder)])
+    assert names(found, folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-1/run", "cell-2/c.mcap"]
+    assert (found[2].arm, len(found[2].files)) == ("cell-1", 3)
+    for glob in ("run/*.mcap", "*/run_0.mcap", "run"):
+        assert {log.arm for log in find_logs([f"{folder}/cell-1/{glob}"])} == {"cell-1"}
+    (folder / "cell-1" / "run" / "metadata.yaml").write_text("x")
+    assert {log.arm for log in find_logs([f"{folder}/cell-1/run/*.mcap"])} == {"cell-1"}
+
+
+def test_logs_that_are_numbered_in_a_folder_of_another_name_are_logs_of_their_own(folder):
+    for name in ("run_0.mcap", "run_1.mcap"):
+        (folder / "cell-2" / name).write_text("x")
+    found = find_logs([str(folder / "cell-2")])
+    assert names(found, folder) == ["cell-2/c.mcap", "cell-2/run_0.mcap", "cell-2/run_1.mcap"]
+    assert {log.arm for log in found} == {"cell-2"}
+    (folder / "cell-2" / "cell-2_0.mcap").write_text("x")  # among others it is no bag
+    assert len(find_logs([str(folder / "cell-2")])) == 4
+
+
 def test_content_and_stamp_follow_the_bytes(folder):
     (log,) = find_logs([str(folder / "cell-1" / "a.csv")])
     before = log.content(), log.stamp()

@@ -136,6 +136,9 @@ def test_copies_of_a_log_are_said_to_be_there_and_broken_files_are_none(logs, tm
         (logs / name).write_text("")
     found, said = said_of([logs], tmp_path / "out.csv")
     (line,) = [line for line in said if "cop" in line]
-    assert line.startswith(f"2 logs are copies of others, byte for byte ({logs}/copy of 0.csv of {logs}/0.csv, ")
+    assert line.startswith(
+        f"3 logs are copies of others, byte for byte, packed or not ({logs}/0.csv.gz of {logs}/0.csv, "
+        f"{logs}/copy of 0.csv of {logs}/0.csv, "
+    )
     assert f"{logs}/link.csv of {logs}/1.csv" in line
     assert found.logs == 7

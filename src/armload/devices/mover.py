@@ -14,6 +14,7 @@ rest: at its end, or, braked along the path (`Course`), when `stop` is asked for
 
 from __future__ import annotations
 
+import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -25,12 +26,13 @@ from armload.arms import Arm
 from armload.devices.load import Load
 from armload.devices.source import Source
 from armload.devices.supervision import Supervision, Thresholds
-from armload.errors import SafetyError, SinkError
+from armload.errors import SafetyError, SinkError, SourceError
 from armload.motion import Course, Motion
 from armload.recording import Sample
 
 AT_START = 0.005  # [rad] between where the arm is commanded to be and where a motion begins: what rounding leaves
 _BLEND = 0.5  # [s] in which that is taken up
+_STOOD = 1.0  # [s] of samples whose times do not rise, after which their clock counts as one that stands
 SETTLE = 0.2  # [s] of samples after a movement's end, while the arm swings out
 
 
@@ -176,10 +178,19 @@ def samples_of_movement(mover: Mover, motion: Motion, thresholds: Thresholds | N
 
     Raises:
         SafetyError: the movement must not begin.
-        SourceError: the connection was lost.
+        SourceError: the connection was lost, the samples end on the way, or their clock stands still.
     """
     mover.follow(motion, thresholds)
+    newest, risen = -np.inf, time.monotonic()
     for sample in mover:
         yield sample
         if not mover.moving:
             return
+        if sample.t > newest:
+            newest, risen = sample.t, time.monotonic()
+        elif time.monotonic() - risen > _STOOD:  # the end of the movement would never come
+            raise SourceError(
+                f"the clock of {mover.name} has stood still for {_STOOD:g} s while the arm was on its way: expected "
+                "times that rise; see that the controller runs"
+            )
+    raise SourceError(f"{mover.name} ended while the arm was on its way: see what the robot says, and open it again")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,19 +25,36 @@ def key_of(*parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def load_cells(folder: str | Path) -> dict[str, dict[str, Any]]:
+def load_cells(folder: str | Path, damaged: list[Path] | None = None) -> dict[str, dict[str, Any]]:
     """The finished cells in a folder, by name.
 
+    Args:
+        damaged: gets the files that are not cells, which are passed over; None: there must be none.
+
     Raises:
-        DatasetError: a file that is not a cell.
+        DatasetError: a file that is not a cell, where `damaged` is None.
     """
-    whole = (path for path in sorted(Path(folder).glob("*.json")) if not path.name.startswith("."))  # else cut off
-    cells = (_read(path) for path in whole)
-    return {cell["name"]: cell for cell in cells}
+    cells = {}
+    for path in sorted(Path(folder).glob("*.json")):
+        if path.name.startswith("."):  # cut off
+            continue
+        if (cell := _read(path)) is not None:
+            cells[cell["name"]] = cell
+        elif damaged is not None:
+            damaged.append(path)
+        else:
+            raise DatasetError(f"{path} is not a cell: delete it, and it will be measured again")
+    return cells
+
+
+def of_damaged(files: Sequence[Path]) -> str:
+    """The sentence on files that are passed over because they are not cells."""
+    count = "1 file is" if len(files) == 1 else f"{len(files)} files are"
+    return f"{count} no whole cell ({files[0]}{', …' * (len(files) > 1)}): what is missing is measured again"
 
 
 def finished_cell(folder: str | Path, name: str, key: str) -> dict[str, Any] | None:
-    """The cell of a name if its file is there with that key, whoever measured it; None otherwise."""
+    """The cell of a name if its file is there, whole and with that key, whoever measured it; None otherwise."""
     path = Path(folder) / f"{name}.json"
     cell = _read(path) if path.is_file() else None
     return cell if cell is not None and cell.get("key") == key else None
@@ -55,11 +73,10 @@ def save_cell(folder: str | Path, cell: dict[str, Any], indent: int | None = 1) 
     return path
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path) -> dict[str, Any] | None:
+    """The cell in a file; None: it is damaged, or another file."""
     try:
         cell = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(cell["name"], str):
-            return cell
+        return cell if isinstance(cell["name"], str) else None
     except (OSError, ValueError, KeyError, TypeError):
-        pass
-    raise DatasetError(f"{path} is not a cell: delete it, and it will be measured again")
+        return None

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from armload.errors import DatasetError
-from armload.lab.cells import finished_cell, key_of, load_cells, save_cell
+from armload.lab.cells import finished_cell, key_of, load_cells, of_damaged, save_cell
 from armload.lab.engine import ATTEMPTS, engine
 from armload.runtime.atomic import replacing
 from armload.runtime.version import __version__, package_versions
@@ -80,10 +80,15 @@ def run_tasks(
             say; None: then the run ends with an error.
         indent: of the cells' JSON; None: each on one line.
 
+    A file in the folder that is no whole cell counts as not measured, which is said.
+
     Raises:
-        DatasetError: a file in the folder that is not a cell, or a task whose process was killed each time.
+        DatasetError: a task whose process was killed each time.
     """
-    folder, started, there = Path(folder), time.monotonic(), load_cells(folder)
+    folder, started = Path(folder), time.monotonic()
+    there = load_cells(folder, damaged := [])
+    if damaged:
+        say(of_damaged(damaged))
     keys = {name: key for task in tasks for name, key in task.keys.items()}
     cells = {name: there[name] for name, key in keys.items() if name in there and there[name].get("key") == key}
 

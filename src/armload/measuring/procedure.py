@@ -115,6 +115,7 @@ class Procedure:
         Raises:
             SafetyError: the plan passes a limit, there is no consent, or the arm had to be stopped. It is at rest then.
             SourceError: the connection was lost.
+            RecordingError: a log cannot be written. The arm is at rest.
             KeyboardInterrupt: somebody interrupted. The arm is at rest.
             ArmloadError: the answer cannot be found; the logs are kept.
         """
@@ -222,11 +223,16 @@ class Procedure:
         self._say(f"moving {purpose}")
         first, last, looked = np.inf, -np.inf, -np.inf
         recorder = None if log is None else Recorder(log, self.mover.n)
+        unkept: RecordingError | None = None
         try:
             with held_back() as interruption:
                 for sample in samples_of_movement(self.mover, leg.motion, self.thresholds):
-                    if recorder is not None:
-                        recorder.append(sample)
+                    if recorder is not None and unkept is None:
+                        try:
+                            recorder.append(sample)
+                        except RecordingError as error:  # what nobody keeps is of no use, and the arm is on its way
+                            unkept = error
+                            self.mover.stop("its log cannot be written")
                     if interruption.name is not None:
                         self.mover.stop(f"interrupted by {interruption.name}")
                     first, last = min(first, sample.t), sample.t
@@ -238,6 +244,10 @@ class Procedure:
         finally:
             if recorder is not None:
                 recorder.close()
+        if unkept is not None:
+            raise RecordingError(
+                f"{unkept}; the arm was stopped on its way {purpose}: make room, and measure again into another folder"
+            )
         if self.mover.why not in (None, ENOUGH):
             raise SafetyError(f"the arm was stopped on its way {purpose}: {self.mover.why}; {_kept(log)}")
         return last - first

@@ -1,6 +1,7 @@
 """Recordings: what a robot's joints did, the files they come in, and whether their data are valid."""
 
 from armload.recording.alignment import Alignment, same_motion
+from armload.recording.bag_parts import is_part_of_bag
 from armload.recording.chunks import read_long, recording_chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.compensated import arm_as_set, with_gravity
@@ -11,6 +12,7 @@ from armload.recording.files import (
     PACKED_SUFFIXES,
     has_topics,
     is_log,
+    log_in,
     read_recording,
     write_recording,
 )
@@ -45,7 +47,9 @@ __all__ = [
     "has_topics",
     "is_data_set",
     "is_log",
+    "is_part_of_bag",
     "largest",
+    "log_in",
     "mark_of",
     "marks_of",
     "parts_of",

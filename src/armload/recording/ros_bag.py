@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
+from armload.recording.bag_parts import PART_SUFFIXES, in_order
 from armload.recording.checked import Chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.currents import in_si
@@ -28,7 +29,7 @@ from armload.recording.steadied import with_velocities_of_positions
 from armload.runtime.extras import missing
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
-BAG_SUFFIXES = (".bag", ".db3", ".mcap")
+BAG_SUFFIXES = (".bag", *PART_SUFFIXES)
 IN_SI = ColumnSpec()
 
 
@@ -112,7 +113,7 @@ def _readers(path: Path, where: str, stack: ExitStack, notes: list[str]) -> list
         from armload.recording.ros1_index import CompactReader
 
         return [CompactReader(path)]
-    parts = [path] if path.is_file() else sorted(p for p in path.iterdir() if p.suffix in (".db3", ".mcap"))
+    parts = [path] if path.is_file() else in_order(p for p in path.iterdir() if p.suffix.lower() in PART_SUFFIXES)
     for part in parts:
         if part.suffix.lower() == ".db3":
             _check_length(part)

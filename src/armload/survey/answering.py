@@ -30,7 +30,7 @@ def answer_log(log: Log, settings: Settings, key: str, stamp: str, content: str)
             return _anew(unusable(str(error), about))
     if stamp and len(rows) == 1 and rows[0]["status"] == UNUSABLE and not _stayed(log, stamp):
         return _anew(rows[0])
-    return {"rows": rows, "stamp": stamp, "content": content}
+    return {"rows": rows, "stamp": stamp, "content": content, "unpacked": _unpacked(log, content)}
 
 
 def lost_log(log: Log, key: str) -> dict[str, Any]:
@@ -42,6 +42,14 @@ def lost_log(log: Log, key: str) -> dict[str, Any]:
 
 class _Unread(RecordingError):
     """A log that could not be fetched or held just now, which says nothing of its content."""
+
+
+def _unpacked(log: Log, content: str) -> str:
+    """What tells copies of a log, packed or not; its content where it cannot be unpacked."""
+    try:
+        return log.unpacked() if content and log.packed else content
+    except (ArmloadError, OSError):
+        return content
 
 
 def _stayed(log: Log, stamp: str) -> bool:

@@ -18,7 +18,16 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from armload.errors import ArmloadError, UsageError
-from armload.recording import LOG_SUFFIXES, data_set_episodes, is_data_set, is_log
+from armload.recording import (
+    LOG_SUFFIXES,
+    PACKED_SUFFIXES,
+    data_set_episodes,
+    is_data_set,
+    is_log,
+    is_part_of_bag,
+    log_in,
+)
+from armload.recording.bag_parts import PART_SUFFIXES
 from armload.survey.remarks import may_be_log, of_passed
 from armload.survey.stores import WILD, is_url, logs_in, stamp_of
 
@@ -70,6 +79,20 @@ class Log:
             return self.stamp()
         return hashlib.sha256("".join(file_hash(file) for file in self.files).encode()).hexdigest()
 
+    @property
+    def packed(self) -> bool:
+        """Whether it is a packed file on this machine."""
+        return not self.remote and len(self.files) == 1 and self.files[0].suffix.lower() in PACKED_SUFFIXES
+
+    def unpacked(self) -> str:
+        """Of a packed log, the `content` that it has unpacked.
+
+        Raises:
+            RecordingError: it cannot be unpacked. OSError: a file cannot be read.
+        """
+        with log_in(self.files[0]) as plain:
+            return hashlib.sha256(file_hash(plain).encode()).hexdigest()
+
 
 def cells_of(table: str | Path) -> Path:
     """The folder of a survey's cells, beside its table."""
@@ -104,7 +127,7 @@ def find_logs(
         paths: files; folders, searched to their bottom for files with the suffix of a log; globs (`**` too); URLs with
             globs; and `@LIST`, a file with one of these on each line. What is named itself is a log whatever its name.
         arm_of: a regular expression searched in a log's path: its first group names the arm; a log that it does not
-            fit has none. None: the folder that the log lies in.
+            fit has none. None: the folder that the log lies in; a ROS 2 bag lies in that of its folder.
         without: files and folders that are passed over, as the survey's own. In folders, the tables of other surveys
             are, too.
         passed: gets the names of files in folders that are passed over, and may be logs (`may_be_log`).
@@ -143,9 +166,24 @@ def _expression(arm_of: str | None) -> re.Pattern[str] | None:
 
 def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
     if pattern is None:
-        return PurePosixPath(name).parent.name or Path(os.path.realpath(name)).parent.name or "/"
+        whole = PurePosixPath(name).parent if _in_bag(name) else PurePosixPath(name)
+        return whole.parent.name or Path(os.path.realpath(whole)).parent.name or "/"
     match = pattern.search(name)
     return "" if match is None else match[1] or ""
+
+
+def _in_bag(name: str) -> bool:
+    """Whether this is a file of a ROS 2 bag's folder."""
+    path = Path(name)
+    return is_part_of_bag(path) or (path.suffix in PART_SUFFIXES and (path.parent / "metadata.yaml").is_file())
+
+
+def _is_bag(folder: Path, inside: Sequence[Path]) -> bool:
+    """Whether this is the folder of a ROS 2 bag: by its metadata or, where these are lost, the names of its files."""
+    if (folder / "metadata.yaml").is_file():
+        return True
+    logs = [path for path in inside if not path.name.startswith(".") and (path.is_dir() or is_log(path))]
+    return bool(logs) and all(is_part_of_bag(path) and path.is_file() for path in logs)
 
 
 def _expanded(paths: Sequence[str], passed: set[str], within: tuple[str, ...] = ()) -> Iterator[str]:
@@ -186,7 +224,7 @@ def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[tuple[str,
         yield path, None, (here,)
     elif is_data_set(here):
         yield from _episodes(here)
-    elif (here / "metadata.yaml").is_file():
+    elif _is_bag(here, inside):
         yield str(here), None, tuple(file for file in inside if file.is_file())
     elif (real := os.path.realpath(here)) not in hidden:
         hidden.add(real)

@@ -73,7 +73,7 @@ def of_copies(contents: Iterable[tuple[str, int | None, str]]) -> str:
         return ""
     logs = "1 log is a copy" if len(copies) == 1 else f"{len(copies)} logs are copies"
     some = _some([f"{name} of {original}" for name, original in copies.items()])
-    return f"{logs} of others, byte for byte ({some}): each counts as a log of its own"
+    return f"{logs} of others, byte for byte, packed or not ({some}): each counts as a log of its own"
 
 
 def _some(names: Sequence[str]) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 from armload.errors import UsageError
 from armload.identification.choice import choose
 from armload.identification.methods import METHODS
-from armload.lab.cells import load_cells
+from armload.lab.cells import load_cells, of_damaged
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
 from armload.survey.logs import Log, cells_of, find_logs
@@ -97,7 +97,9 @@ def survey(
     settings.mounted()
     _check_method(settings)
     count = "1 log" if len(logs) == 1 else f"{len(logs)} logs"
-    before = load_cells(folder)
+    before = load_cells(folder, damaged := [])
+    if damaged:
+        say(of_damaged(damaged))
     # what was answered once may be away for a while: its row says so
     if not any(log.there or _name(log) in before for log in logs):
         raise UsageError(f"{', '.join(paths)}: no such file or folder: expected logs, folders, globs or URLs")
@@ -116,7 +118,8 @@ def survey(
     )
     of_each = [cells.get(task.name) or before[task.name] for task in tasks]
     answered = [(log, cell) for log, cell in zip(logs, of_each, strict=True) if cell["rows"][0]["status"] != UNUSABLE]
-    if remark := of_copies((log.name, log.episode, cell["content"]) for log, cell in answered):
+    # a cell of an earlier version knows its content as it is packed only
+    if remark := of_copies((log.name, log.episode, cell.get("unpacked", cell["content"])) for log, cell in answered):
         say(remark)
     rows = [row for cell in of_each for row in cell["rows"]]
     rows.sort(key=lambda row: (row["log"], -1 if row["episode"] is None else row["episode"], row.get("part") or 0))

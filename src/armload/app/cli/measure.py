@@ -90,10 +90,14 @@ def run(options: argparse.Namespace) -> int | None:
             print_json(procedure.plan.to_dict()) if options.json else print(procedure.plan)
             return None
         found = procedure.run(_consent(options), _mount(options, mover))
-        if options.out is not None:
-            write_json(options.out, found.to_dict())
         for note in found.answer.notes:
             print_note(note)
+        if options.out is not None:
+            try:
+                write_json(options.out, found.to_dict())
+            except UsageError:  # its folder is gone, say: the arm need not move for the answer once more
+                _print(found, options)
+                raise
         if options.apply:
             _apply(found, mover, mounted, options)
         _print(found, options)
@@ -181,7 +185,10 @@ def _mount(options: argparse.Namespace, mover: Mover) -> Callable[[], None]:
             print_note(f"mounting: {grip}")
             code = subprocess.run(options.grip, stdout=sys.stderr, check=False).returncode
             if code:
-                raise SafetyError(f"{grip} ended with exit code {code}: the payload may not be on")
+                raise SafetyError(
+                    f"{grip} ended with exit code {code}: the payload may not be on; mount it, and go on with "
+                    "the log of the empty run as --tare"
+                )
         elif not mover.mount():
             print("mount the payload, step back, and press Enter: the arm then moves: ", end="", file=sys.stderr)
             sys.stderr.flush()

@@ -119,7 +119,7 @@ def run_benchmark(
         jobs, cluster, until, say: see `run_tasks`.
     """
     robot = arm(size.robot)
-    cells = load_cells(folder)
+    cells = load_cells(folder, [])  # `run_tasks` says which are damaged
     say("checking what is finished")
     wanted = {name: rows_for(population(name), size.methods) for name in size.populations}
     valid = keys(size, robot, _with_finished(cells, wanted))
