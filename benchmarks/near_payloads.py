@@ -9,7 +9,7 @@ once it recognises what that held (`Runs.is_earlier`); beside the rule as it is 
 deviation for every mass (`RETURN_STD`, without `RETURN_SHARE`). Both see the same streams.
 
 Looked at 0.2, 0.5, 1, 2 and 3.5 s after the end of a hand-over, or, of an arm that stands, after it moves on (faster
-than 0.05 rad/s). *called the same*: events that end as a "return" of something held. Streams are cells, as in
+than 0.05 rad/s). *false*: events that are not within three seconds of a hand-over's beginning. Streams are cells, as in
 `cell_hours.py`. Printed, and written to benchmarks/results/near_payloads.json and a table of docs/online_measured.md;
 printed only with another seed than 76000.
 """
@@ -72,14 +72,14 @@ def moments(stream: Stream) -> list[tuple[float, float, float]]:
 def measured(lot: Lot) -> dict[str, Any]:
     """One stream as a cell's numbers."""
     stream = streamed(Hours(lot.kind, lot.seed), SECONDS, APART, lot.box)
-    looked, found, kinds, before = moments(stream), [], {}, runs.RETURN_SHARE
+    looked, found, events, before = moments(stream), [], set(), runs.RETURN_SHARE
     identifier = OnlineIdentifier(stream.robot)
     try:
         runs.RETURN_SHARE = FIXED if lot.fixed else before
         for sample in stream.log:
             one = identifier.update(*sample)
             if one.event is not None:
-                kinds[one.event.t] = (one.event.kind, one.held)
+                events.add(one.event.t)
             while looked and one.t >= looked[0][0]:
                 _, after, mass = looked.pop(0)
                 low, high = float(one.low[0]), float(one.high[0])
@@ -88,11 +88,9 @@ def measured(lot: Lot) -> dict[str, Any]:
         runs.RETURN_SHARE = before
         identifier.close()
     begins = np.array([change.start for change in stream.changes])
-    false = [t for t in kinds if not ((begins <= t) & (t < begins + 3.0)).any()]
+    false = [t for t in sorted(events) if not ((begins <= t) & (t < begins + 3.0)).any()]
     return {
         "looks": found,
-        "same": sum(kind == "return" and held for kind, held in kinds.values()),
-        "taken_up": sum(bool(change.phi[0]) for change in stream.changes),
         "false": false,
         "hours": SECONDS / 3600.0,
     }
@@ -109,8 +107,7 @@ def of_row(cells: list[dict[str, Any]]) -> dict[str, Any]:
             "error_g": round(1e3 * float(np.median(np.abs(error))), 1),
             "half_width_g": round(1e3 * float(np.median(half)), 1),
         }
-    sums = {name: sum(cell[name] for cell in cells) for name in ("same", "taken_up")}
-    return {"after": after, **sums, "false": sum(len(cell["false"]) for cell in cells)}
+    return {"after": after, "false": sum(len(cell["false"]) for cell in cells)}
 
 
 def show(rows: list[dict[str, Any]]) -> None:
@@ -123,7 +120,6 @@ def show(rows: list[dict[str, Any]]) -> None:
                 row["kind"],
                 f"{row['mass']:g} kg" + (f" ± {100 * row['share']:.0f} %" if row["share"] else ", the same"),
                 "15 g" if row["fixed"] else "as it is",
-                f"{row['same']} of {row['taken_up']}",
                 str(row["false"]),
                 " · ".join(f"{100 * x['inside']:.0f}" for x in after) + f" of {row['after']['1']['of']}",
                 " · ".join(f"{x['error_g']:.0f} ± {x['half_width_g']:.0f}" for x in after),
@@ -134,12 +130,11 @@ def show(rows: list[dict[str, Any]]) -> None:
         "the arm",
         "boxes",
         "rule",
-        "called the same",
         "false",
         f"inside after {told} s [%]",
         f"error ± half-width [g] after {told} s",
     )
-    write_table(PAGE, "near", markdown_table(columns, "lllrrrr", lines))
+    write_table(PAGE, "near", markdown_table(columns, "lllrrr", lines))
 
 
 def main() -> None:

@@ -90,6 +90,23 @@ def test_what_was_on_at_the_tare_and_comes_off_within_a_log_is_found(panda, when
 
 
 @pytest.mark.full  # some seconds
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_payload_taken_up_at_times_that_jitter_is_found(panda, seed):
+    """Torques at wrong times look as if a part of the payload swung, but what swings never weighs nothing."""
+    body = draw_payload("boxes", 3, 1.2)
+    how = {"world": World.real_like(panda, seed), "sensors": Sensors.of(panda), "rate": 25.0}
+    source = Simulator(
+        panda, random_motion(panda, seed), [(0.0, None), (28.0, body)], speed=None, duration=36.0, seed=seed, **how
+    )
+    log = Recording(*map(np.array, zip(*source, strict=True)))
+    tare, run = log.between(0.0, 20.0), log.between(22.0, 36.0)
+    late = np.random.default_rng(seed).uniform(-0.012, 0.012, len(run.t))
+    found = identify(replace(run, t=run.t + late), panda, tare=tare)
+    assert [part.start for part in found.segments] == [0.0, pytest.approx(6.0, abs=0.15)]
+    assert found.phi_low[0] <= body.parameters.mass <= found.phi_high[0]
+
+
+@pytest.mark.full  # some seconds
 def test_what_is_taken_up_shortly_before_the_end_is_found(panda, payload):
     found = identify(log_of(panda, [(0.0, None), (5.2, payload)]), panda)
     assert [part.start for part in found.segments] == [0.0, pytest.approx(5.2, abs=0.1)]

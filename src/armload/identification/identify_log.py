@@ -34,7 +34,7 @@ from armload.identification.one_payload import Question, answer_of_one_payload, 
 from armload.identification.plausibility import check_plausible
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import drift_since
-from armload.identification.thresholds import EXPLAINS, LOWEST_RATE, SETTLED
+from armload.identification.thresholds import EXPLAINS, LOWEST_RATE, SETTLED, SWAYS
 from armload.identification.torque_scale import torque_scale
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.payloads import Payload, read_payload
@@ -161,7 +161,7 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
         unknown = replace(question.asked, known=None)  # what is known is what is held at the end
         of_parts[:-1] = [replace(of_part, asked=unknown) for of_part in of_parts[:-1]]
         answers = [answer_of_one_payload(part, arm, of_part) for part, of_part in zip(parts, of_parts, strict=True)]
-        if whole.moves and 2 * sum(answer.moves for answer in answers) > len(answers):
+        if _moves_in_parts(whole, answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
     if changes.drift is not None:
         answers = [
@@ -178,6 +178,18 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
     misfit = 0.0 if whole.health is None else whole.health.misfit or 0.0
     doubts = len(times) + changes.doubted + sum(answer.doubts for answer in answers)
     return _Account(answer, doubts, max(changes.left, misfit / CHANGED))
+
+
+def _moves_in_parts(whole: Identification, parts: Sequence[Identification]) -> bool:
+    """Whether one payload moves by itself: no rigid body is in most of the parts either, and none weighs otherwise."""
+    if not whole.moves or 2 * sum(part.moves for part in parts) <= len(parts):
+        return False
+    return not any(_weigh_otherwise(before, after) for before, after in pairwise(parts))
+
+
+def _weigh_otherwise(before: Identification, after: Identification) -> bool:
+    apart = max(before.phi_low[0] - after.phi_high[0], after.phi_low[0] - before.phi_high[0])
+    return apart > SWAYS * max(abs(before.mass), abs(after.mass))
 
 
 def _doubted(answer: Identification, note: str) -> Identification:

@@ -66,6 +66,10 @@ PAUSE_SAID = 1.0
 
 # ---------------------------------------------------------------------- a payload that changes, `segments.py`
 
+# [of the heavier one] by how much the masses of two parts have to differ beside their half-widths where neither is
+# rigid: by less, it is one payload that swings. A stated prior: of one of which 30 % swing or slosh, parts differ by up
+# to 10 %; of one that is taken up by all of it (test_a_payload_taken_up_at_times_that_jitter_is_found)
+SWAYS = 0.3
 # T of what is added at a cut of the log, where the payload has changed: the 99.9 % quantile of a chi-squared
 # distribution of ten degrees of freedom; sound simulated logs stay below (`benchmarks/changed_logs.py`)
 PAYLOAD_CHANGED = 29.588298445074422
