@@ -59,8 +59,12 @@ def kept(folder: Path, names: list[str] | None = None) -> list[Path]:
         folder.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder, prefix="compiling-") as name:
             compile_all(Path(name), names)
-            Path(name).rename(place)
-            Path(name).mkdir()  # which is removed now
+            try:
+                Path(name).rename(place)
+                Path(name).mkdir()  # which is removed now
+            except OSError:
+                if not place.is_dir():  # else another process was first
+                    raise
     return sorted(place.glob("_kernels_*.so"))
 
 

@@ -1,6 +1,7 @@
 """What a wheel is compiled for is what Python calls, and a library gets only arguments that it was compiled for."""
 
 import ast
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -82,3 +83,23 @@ def test_arguments_that_fit_reach_the_library_by_place_or_name(ahead):
     function(x, a=np.float64(1.0))
     function(x, 1)
     assert handed == [(x, 1.0)] * 3
+
+
+def test_two_processes_that_compile_at_once_both_get_the_libraries(tmp_path, monkeypatch):
+    spec = spec_from_file_location("hatch_build", Path(__file__).parents[2] / "hatch_build.py")
+    build = module_from_spec(spec)
+    spec.loader.exec_module(build)
+
+    found, begun = [], []
+
+    def compile_all(folder, _):
+        (folder / "_kernels_any.so").write_text("compiled")
+        begun.append(folder)
+        if len(begun) == 1:
+            found.append(build.kept(tmp_path))  # another process, which is done first
+
+    monkeypatch.setattr(build, "compile_all", compile_all)
+    found.append(build.kept(tmp_path))
+    assert found[0] == found[1]
+    assert [path.read_text() for path in found[1]] == ["compiled"]
+    assert [path.name for path in tmp_path.iterdir()] == [found[1][0].parent.name]  # nothing else is left
