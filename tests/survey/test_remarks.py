@@ -71,6 +71,19 @@ def test_one_sentence_says_which_files_were_passed_over(logs, tmp_path, capsys):
     assert json.loads(text)["passed_over"] == 3
 
 
+def test_files_that_are_read_as_one_bag_for_want_of_its_metadata_are_named(logs, tmp_path):
+    bag = logs / "run"
+    bag.mkdir()
+    for name in ("run_0.mcap", "run_1.mcap"):
+        (bag / name).write_bytes(b"x")
+    _, said = said_of([logs], tmp_path / "a.json")
+    (line,) = [line for line in said if "metadata.yaml" in line]
+    assert f"1 folder is read as one log, as a ROS 2 bag that has lost its metadata.yaml ({bag}: 2 files)" in line
+    assert not any("lost its" in line for line in said_of([f"{bag}/*.mcap"], tmp_path / "b.json")[1])  # as it advises
+    (bag / "metadata.yaml").write_text("x")
+    assert not any("lost its" in line for line in said_of([logs], tmp_path / "c.json")[1])
+
+
 def test_a_file_that_is_named_itself_is_not_passed_over(logs):
     (logs / "a.xlsx").write_bytes(b"x")
     passed: set[str] = set()

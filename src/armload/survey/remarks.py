@@ -1,4 +1,4 @@
-"""What a survey says of its logs as a whole: files it passed over, logs that leave its table, copies."""
+"""What a survey says of its logs as a whole: files it passed over, logs that leave its table, bags, copies."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path, PurePosixPath
 
-from armload.recording import NAMED_SUFFIXES, PACKED_SUFFIXES, is_log
+from armload.recording import NAMED_SUFFIXES, PACKED_SUFFIXES, is_log, is_part_of_bag
 
 _MOST_NAMED = 3  # files in a sentence
 # of spreadsheets, archives, and what other programs keep measured series in
@@ -58,6 +58,23 @@ def of_left_out(out: Path, before: Collection[str], now: Collection[str]) -> str
     return (
         f"{out} holds {logs} not among those of this survey ({_some(gone)}): the new table leaves them out; to have "
         "all in one table, name all of them (none is answered twice), else give another --out"
+    )
+
+
+def of_bags(logs: Iterable[tuple[str, Sequence[Path]]]) -> str:
+    """The sentence on logs (name, files) that are bags by the names of several files alone; empty: there are none."""
+    parts = {
+        name: sum(map(is_part_of_bag, files))
+        for name, files in logs
+        if all(file.name != "metadata.yaml" for file in files)
+    }
+    bags = [f"{name}: {count} files" for name, count in parts.items() if count > 1]
+    if not bags:
+        return ""
+    folders = "1 folder is read as one log" if len(bags) == 1 else f"{len(bags)} folders are read as one log each"
+    return (
+        f"{folders}, as a ROS 2 bag that has lost its metadata.yaml ({_some(bags)}): where every file is a log of its "
+        "own, name the files, such as FOLDER/*.mcap"
     )
 
 

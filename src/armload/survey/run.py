@@ -22,7 +22,7 @@ from armload.lab.cells import load_cells, of_damaged
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
 from armload.survey.logs import Log, cells_of, find_logs
-from armload.survey.remarks import of_copies, of_left_out, of_passed
+from armload.survey.remarks import of_bags, of_copies, of_left_out, of_passed
 from armload.survey.rows import UNUSABLE
 from armload.survey.settings import Settings
 from armload.survey.table_file import check_suffix, logs_in_table, whole, write_rows
@@ -91,7 +91,8 @@ def survey(
         if without := settings.arms_without(what, arms):
             of = ", ".join(without[:_MOST_NAMED]) + ", …" * (len(without) > _MOST_NAMED)
             say(f"no --{what} {getattr(settings, what)} of {len(without)} of {len(arms)} arms ({of}): answered without")
-    for remark in (of_passed(sorted(passed)), of_left_out(out, earlier, {whole(log.name) for log in logs})):
+    left_out = of_left_out(out, earlier, {whole(log.name) for log in logs})
+    for remark in (of_passed(sorted(passed)), of_bags((log.name, log.files) for log in logs), left_out):
         if remark:
             say(remark)
     settings.mounted()
