@@ -89,11 +89,7 @@ def measured(lot: Lot) -> dict[str, Any]:
         identifier.close()
     begins = np.array([change.start for change in stream.changes])
     false = [t for t in sorted(events) if not ((begins <= t) & (t < begins + 3.0)).any()]
-    return {
-        "looks": found,
-        "false": false,
-        "hours": SECONDS / 3600.0,
-    }
+    return {"looks": found, "false": false}
 
 
 def of_row(cells: list[dict[str, Any]]) -> dict[str, Any]:
@@ -126,14 +122,8 @@ def show(rows: list[dict[str, Any]]) -> None:
             )
         )
     told = " · ".join(f"{x:g}" for x in AFTER)
-    columns = (
-        "the arm",
-        "boxes",
-        "rule",
-        "false",
-        f"inside after {told} s [%]",
-        f"error ± half-width [g] after {told} s",
-    )
+    last = (f"inside after {told} s [%]", f"error ± half-width [g] after {told} s")
+    columns = ("the arm", "boxes", "rule", "false", *last)
     write_table(PAGE, "near", markdown_table(columns, "lllrrr", lines))
 
 

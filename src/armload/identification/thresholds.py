@@ -167,10 +167,10 @@ SWAPPED_MISFIT = 1.0
 # of the misfit, what may be left with two torque columns exchanged back: real logs leave at most 0.449
 # (test_exchanged_torque_columns_of_a_real_log_are_named)
 SWAPPED_SHARE = 0.45
-# [log odds] by which two joints exchanged back explain a log better, one window in four counting: 55 to 1. Of 260
-# sound simulated logs of all arms one is explained better so, by 2.8, and the rest by at most 0.9, with torques 60 ms
-# late none by more than 2; of the first and third joint exchanged it is 15 and more, but for a small arm, of the last
-# two joints of a UR10e 4 and more in three of four logs
+# [log odds] by which two joints exchanged back explain a log better, one window in four counting: 55 to 1. Of 192
+# sound simulated logs of all arms one is explained better so by 2.8, one by 1.2, the rest by at most 0.7, with torques
+# 60 ms late none by more than 2; of the first and third joint exchanged it is 15 and more, but for a small arm, of the
+# last two joints of a UR10e 4 and more in three of four logs
 # (test_joints_in_the_order_of_the_alphabet_are_refused_by_name, `benchmarks/wrong_logs.py`)
 JOINTS_EXCHANGED = 4.0
 # [log odds] by which two joints exchanged back explain a log better with viscous friction and rotors among the

@@ -175,7 +175,7 @@ def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
 def _in_bag(name: str) -> bool:
     """Whether this is a file of a ROS 2 bag's folder."""
     path = Path(name)
-    return is_part_of_bag(path) or (path.suffix in PART_SUFFIXES and (path.parent / "metadata.yaml").is_file())
+    return is_part_of_bag(path) or (path.suffix.lower() in PART_SUFFIXES and (path.parent / "metadata.yaml").is_file())
 
 
 def _is_bag(folder: Path, inside: Sequence[Path]) -> bool:
