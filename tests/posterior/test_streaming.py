@@ -1,5 +1,10 @@
 """The live form of the default method: every shortcut it takes, against the form that takes none."""
 
+import json
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -9,6 +14,7 @@ from armload.motion import random_motion, taie2024
 from armload.payloads import test_payload as make_payload
 from armload.posterior import HybridIdentifier, PosteriorLeastSquares
 from armload.posterior.solve import solve_to_go_on
+from armload.recording import write_recording
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH
@@ -195,3 +201,47 @@ def test_two_tares_say_what_one_tare_of_their_rows_says(panda, rows):
     unit = np.sqrt(np.diag(one.covariance))
     assert two.phi / unit == pytest.approx(one.phi / unit, abs=1e-6)
     assert two.covariance / np.outer(unit, unit) == pytest.approx(one.covariance / np.outer(unit, unit), abs=1e-6)
+
+
+_COUNTS_THREADS = """
+import json, sys
+from threading import current_thread, main_thread
+
+from threadpoolctl import ThreadpoolController
+
+from armload.arms import arm
+from armload.posterior import HybridIdentifier
+from armload.posterior.problem import Problem
+from armload.recording import read_recording
+from armload.regression.information import RegressionData
+
+blas, seen = ThreadpoolController().select(user_api="blas").lib_controllers, []
+
+def spy(take):
+    def spied(self, *arguments):
+        if current_thread() is not main_thread():
+            seen.append(max(library.num_threads for library in blas))
+        return take(self, *arguments)
+    return spied
+
+RegressionData.take, Problem.posterior = spy(RegressionData.take), spy(Problem.posterior)
+before = max(library.num_threads for library in blas)
+live = HybridIdentifier(arm("panda"))
+for sample in read_recording(sys.argv[1]):
+    live.update(sample)
+live.close()
+print(json.dumps([before, seen, max(library.num_threads for library in blas)]))
+"""
+
+
+@pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="BLAS has one thread on one core")
+def test_the_products_beside_a_stream_keep_to_one_thread(log, tmp_path):
+    """BLAS's own threads would wait busily for the next product, of which there are a hundred a second."""
+    write_recording(tmp_path / "log.csv", log.between(0.0, 1.0))
+    settings = {**os.environ, "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2"}
+    command = [sys.executable, "-c", _COUNTS_THREADS, str(tmp_path / "log.csv")]
+    done = subprocess.run(command, env=settings, capture_output=True, text=True, check=True)
+    before, seen, after = json.loads(done.stdout)
+    assert before == after == 2
+    assert len(seen) > 5
+    assert set(seen) == {1}

@@ -14,11 +14,8 @@ Lemoine, ICRA 2007 (arm and load together); Gautier, J. Robotic Systems 1991 (ba
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from armload.arms import Arm, rated_effort
 from armload.estimators.contract import Estimate, Identifier
@@ -28,16 +25,12 @@ from armload.regression import Correction, payload_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
 from armload.regression.noise import RIGID
+from armload.runtime.one_thread import one_thread
 
 _STATES = 200  # random states that show which directions of eta ever act
 _STRUCTURAL = 1e-8  # of the largest singular value: below it a direction never acts
 _UNSEEN = 1e-8  # of the largest information: as much is added to every direction, so that none is without any
 _PASSES = 2  # solutions, the first with the residual as expected before
-
-
-@cache
-def _threads() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 class JointLeastSquares(Identifier):
@@ -87,7 +80,7 @@ class JointLeastSquares(Identifier):
         self._count += len(t)
 
     def _estimate(self, t: float) -> Estimate:
-        with _threads().limit(limits=1):  # matrices of a hundred rows: BLAS threads cost more than they bring
+        with one_thread():  # matrices of a hundred rows: BLAS threads cost more than they bring
             self._phi, self._covariance = self._solve()
         self._solved_at = t
         return self._last(t)

@@ -28,12 +28,12 @@ from armload.posterior import Profile
 from armload.posterior.cramer_rao import followed
 from armload.posterior.problem import Problem
 from armload.posterior.scales import Scales
-from armload.posterior.solve import threads
 from armload.recording import Recording
 from armload.regression import Correction, GaussianPrior, JointFeatures, payload_prior_std
 from armload.regression.information import SAME, RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH, whole_noise
+from armload.runtime.one_thread import one_thread
 
 # of pose and velocity: the bound with 128 and 12 differs by less than 1e-5 of a half-width with a tare along the same
 # motion, by up to 4 % without one or with another (test_what_is_maximised_is_the_bound)
@@ -113,7 +113,7 @@ class Criterion:
         order = {"same": [0, 0], "own": [1, 0], None: [0]}[self._designed_tare]
         runs = [self._data(rows) for rows in motions]
         several = [*self._fixed, *(copy(runs[k]) for k in order)]  # a problem tells its runs apart by identity
-        with threads().limit(limits=1):
+        with one_thread():
             problem = Problem(several, self._prior_std, self._prior, self.noise)
             scales = problem.scales(None)
             if self._start is not None:

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from armload.posterior.problem import Problem
 from armload.posterior.scales import Scales
-from armload.posterior.solve import threads
 from armload.regression import JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH
+from armload.runtime.one_thread import one_thread
 
 Told = tuple[NDArray[np.float64], NDArray[np.float64]]  # Λ and h
 
@@ -49,7 +49,7 @@ class Unchanged:
     ) -> None:
         self._stretches = [stretch.of_features(features) for stretch in stretches]
         whole = RegressionData.joined(self._stretches)
-        with threads().limit(limits=1):
+        with one_thread():
             problem = Problem([*known, whole], prior_std, None, SMOOTH, same=True)
             scales = problem.scales(scales)
             self._found = problem.posterior(scales)

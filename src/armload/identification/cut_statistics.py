@@ -36,12 +36,13 @@ from armload.identification.thresholds import DRIFT_SAID, LOSS_DIFFERS, PAYLOAD_
 from armload.posterior import SmoothPosteriorLeastSquares
 from armload.posterior.problem import Problem
 from armload.posterior.scales import Scales
-from armload.posterior.solve import solve, threads
+from armload.posterior.solve import solve
 from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH, NoiseModel
 from armload.regression.prior import BODY_SIZES, body_root
 from armload.regression.rows_of_log import RowsOfLog
+from armload.runtime.one_thread import one_thread
 
 # of joint torque sensors: what is left of vibration looks like a change where it is taken to be less. What motor
 # currents leave is friction mostly: with this, two of 24 small changes more were missed, and three of 96 sound logs
@@ -238,7 +239,7 @@ def _without_payload(runs: Sequence[RegressionData], arm: Arm, start: Scales | N
     """
     if not runs:
         return []
-    with threads().limit(limits=1):
+    with one_thread():
         problem = Problem(list(runs), payload_prior_std(arm), None, SMOOTH, same=True)
         phi = problem.posterior(problem.scales(start)).mean[:10]
     out = []

@@ -42,8 +42,10 @@ from armload.posterior import KnownCentre, KnownMass, Profile, load_profile
 from armload.posterior.drift import CHANGED
 from armload.recording import Recording, check_own_measurements, read_recording, steadied
 from armload.regression.mismatch import LINK_LOSS
+from armload.runtime.one_thread import one_thread
 
 
+@one_thread()
 def identify(
     recording: Recording | str | Path,
     arm: Arm | str | Path,

@@ -21,6 +21,7 @@ from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.solve import Solution
 from armload.regression.information import RegressionData
 from armload.regression.rows import Row, Rows
+from armload.runtime.one_thread import one_thread
 
 # [rows] after which the scales are found anew (0.1, 0.3, … 30 s): they change with the logarithm of the time. And after
 # every so many, 20 s: another arm, which is asked for then, is to be told within a minute
@@ -133,6 +134,7 @@ class Accumulation:
         self._handover.abandon()
         self._handover.close()
 
+    @one_thread()
     def _add(self, rows: Rows) -> None:
         self.run.take(rows)
         if self._same_motion is not None:
@@ -143,6 +145,7 @@ class Accumulation:
         if rows:
             self._add(Rows.of(rows))
 
+    @one_thread()
     def _with(self, late: list[Row]) -> RegressionData:
         run = deepcopy(self.run, {id(self.run.correction): self.run.correction})
         if late:
@@ -156,6 +159,7 @@ class Accumulation:
             self._add(Rows.of(rows))
         return None, self.better(covariance)
 
+    @one_thread()
     def _solved(
         self, rows: list[Row], late: list[Row], covariance: NDArray, solve: Callable[[RegressionData], Solution]
     ) -> Result:

@@ -27,10 +27,11 @@ from armload.posterior.drift import ALLOWED
 from armload.posterior.elimination import eliminated
 from armload.posterior.problem import Problem, of_mounted
 from armload.posterior.scales import AnotherArm, Posterior, Scales
-from armload.posterior.solve import Solution, solve, solve_to_go_on, threads
+from armload.posterior.solve import Solution, solve, solve_to_go_on
 from armload.regression import GaussianPrior
 from armload.regression.information import SAME, RegressionData
 from armload.regression.noise import NoiseModel
+from armload.runtime.one_thread import one_thread
 
 # z above which a run surprises as one of the same arm seldom does: sound simulated logs and streams stay below 1, but
 # those of arms beyond the measured ones do not, and there B must tell (`benchmarks/tare_drift.py`)
@@ -70,7 +71,7 @@ def another_arm(
         for run in own:
             run.session = replace(run.session, number=1, drift=max(ALLOWED, run.session.drift))
     S, scales = found.scales.noise, found.scales
-    with threads().limit(limits=1):
+    with one_thread():
         same = Problem([first, *own], prior_std, prior, noise)
         before = Problem([first], prior_std, None, noise)
         other = Problem([_of_session_0(run) for run in own], prior_std, prior, noise)

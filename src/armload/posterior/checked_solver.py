@@ -16,10 +16,11 @@ from armload.posterior.another_arm import FROM, another_arm, apart
 from armload.posterior.drift import ALLOWED, ASKED_FROM, TESTED, drift_since_tare
 from armload.posterior.restless import RESTLESS, restlessness
 from armload.posterior.scales import Posterior, Scales
-from armload.posterior.solve import Solution, improved, solve_to_go_on, threads
+from armload.posterior.solve import Solution, improved, solve_to_go_on
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData, Session
 from armload.regression.noise import NoiseModel
+from armload.runtime.one_thread import one_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class CheckedSolver:
         """One step of expectation–maximisation from the scales of the last solution, and what a stream is asked."""
         about, times = (self.prior_std, self.prior, self.noise), [run.blocks.duration for run in runs]
         seconds, own = times[-1], sum(times[self.given :])
-        with threads().limit(limits=1):
+        with one_thread():
             problem, scales = improved(runs, *about, 1, start)
             out = Solution.of(problem, scales)
             shown = sum(times) >= tilt.ASKED_FROM if out.posterior.torque == "link" else seconds >= FROM

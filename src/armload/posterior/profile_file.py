@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from armload.posterior.profile import Profile, SessionRecord
 from armload.posterior.scales import Scales
 from armload.regression import JointFeatures
+from armload.runtime.one_thread import one_thread
 from armload.runtime.tensor_file import TensorFile
 
 _FILE = TensorFile("armload-profile", 1, "profile", "learn", "armload profile", unsigned=True)
@@ -108,6 +109,7 @@ def _session(found: dict[str, Any]) -> SessionRecord:
     return SessionRecord(**made)
 
 
+@one_thread()
 def _factors(A: NDArray, b: NDArray, R: int, variance: NDArray) -> dict[str, NDArray]:
     n, c = len(A), A.shape[1] - R
     lower = np.tril_indices(R)
@@ -124,6 +126,7 @@ def _factors(A: NDArray, b: NDArray, R: int, variance: NDArray) -> dict[str, NDA
     return {"factor": L32, "crossed": V32, "own": own, "shared": 0.5 * (Z + Z.T), "vector": z}
 
 
+@one_thread()
 def _information(tensors: dict[str, NDArray], R: int) -> tuple[NDArray, NDArray]:
     """A (n, S, S), b (n, S); what the joints share is put into the first joint's."""
     variance, own = tensors["features"], tensors["own"]

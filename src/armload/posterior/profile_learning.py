@@ -30,12 +30,12 @@ from armload.posterior.profile import Profile, SessionRecord, attached_mass, fin
 from armload.posterior.profile_agreement import carried, check_agree
 from armload.posterior.profile_session import STATED, check_fits, log_data, poses, record, with_session, without_drift
 from armload.posterior.scales import Scales
-from armload.posterior.solve import threads
 from armload.recording import Recording, digest_of, marks_of
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
+from armload.runtime.one_thread import one_thread
 
 # features of the pose that a profile may have; the first is that of a single tare. A stream's row takes a third of a
 # millisecond at the last
@@ -53,6 +53,7 @@ _PREDICTED = 1.0  # [s] of a block that is predicted: residuals stay correlated 
 _MOST_BLOCKS = 64  # of a log: their covariance is a matrix
 
 
+@one_thread()
 def learn_profile(
     arm: Arm,
     logs: Sequence[Recording],
@@ -100,8 +101,7 @@ def learn_profile(
         features = JointFeatures(arm.n, CAPACITIES[-1] if len(logs) >= _FEWEST else CAPACITIES[0])
         together = _together(logs, numbers)
         parts = [rows(k, features) for k in together]
-        with threads().limit(limits=1):
-            known = _learned(correction, parts, [logs[k] for k in together])
+        known = _learned(correction, parts, [logs[k] for k in together])
         del parts
         later = [k for k in later if k not in set(together)]
         for k in later:
@@ -109,8 +109,7 @@ def learn_profile(
     for number in dict.fromkeys(numbers[k] for k in later):
         of = [k for k in later if numbers[k] == number]
         data = RegressionData.joined([rows(k, known.features) for k in of])
-        with threads().limit(limits=1):
-            known = with_session(known, correction, data, [logs[k] for k in of])
+        known = with_session(known, correction, data, [logs[k] for k in of])
     return known
 
 

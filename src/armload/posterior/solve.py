@@ -18,11 +18,9 @@ Sources: information form and EM: Bishop 2006, ch. 3 and 9; arm and load togethe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from armload.posterior.problem import Problem
 from armload.posterior.scales import AnotherArm, Drift, Posterior, Scales, Tilt
@@ -30,12 +28,7 @@ from armload.posterior.sequential import SequentialPosterior
 from armload.regression import GaussianPrior
 from armload.regression.information import RegressionData
 from armload.regression.noise import RIGID, NoiseModel
-
-
-@cache
-def threads() -> ThreadpoolController:
-    """Limits BLAS to one thread: for matrices of a hundred rows more cost up to 100 × on a busy machine."""
-    return ThreadpoolController()
+from armload.runtime.one_thread import one_thread
 
 
 @dataclass(eq=False)
@@ -83,7 +76,7 @@ def solve(
     where that is given. `start` holds scales found before, of the same runs or of all but the last; one step of
     expectation–maximisation fewer than `iterations` is made from there.
     """
-    with threads().limit(limits=1):
+    with one_thread():
         problem, scales = improved(runs, prior_std, prior, noise, iterations - 1, start)
         return problem.answer(scales, problem.posterior(scales))
 
@@ -97,7 +90,7 @@ def solve_to_go_on(
     start: Scales | None,
 ) -> Solution:
     """The same, with the state that takes further rows. Arguments as of `solve`."""
-    with threads().limit(limits=1):
+    with one_thread():
         return Solution.of(*improved(runs, prior_std, prior, noise, iterations - 1, start))
 
 

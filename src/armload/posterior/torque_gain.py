@@ -26,11 +26,12 @@ from armload.posterior.problem import GAIN_STD, Problem, assumed_gain
 from armload.posterior.profile import Profile
 from armload.posterior.profile_session import log_data
 from armload.posterior.scales import Scales
-from armload.posterior.solve import solve, threads
+from armload.posterior.solve import solve
 from armload.recording import Recording
 from armload.regression import Correction, payload_prior_std, solution_prior_std
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
+from armload.runtime.one_thread import one_thread
 
 # times what is expected of a sensor of its side (`assumed_gain`) that a joint's gain may be off, 1 sigma: a joint whose
 # sensor is far off is what a known weight is hung on for. A stated prior
@@ -62,7 +63,7 @@ def with_known_weight(profile: Profile, arm: Arm, log: Recording, mass: float, s
     correction = Correction(arm, rated_effort(arm))
     data = log_data(correction, log, profile.features, profile.session(correction))
     runs, wide = [profile.data(correction, GAIN, SMOOTH.block), data], solution_prior_std(arm)
-    with threads().limit(limits=1):
+    with one_thread():
         found = solve(runs, wide, None, SMOOTH, 3, profile.scales)
         phi, mass_std = found.phi, float(np.sqrt(found.covariance[0, 0]))
         side = assumed_gain(arm, found.torque)
