@@ -134,7 +134,6 @@ class Accumulation:
         self._handover.abandon()
         self._handover.close()
 
-    @one_thread()
     def _add(self, rows: Rows) -> None:
         self.run.take(rows)
         if self._same_motion is not None:
@@ -145,7 +144,6 @@ class Accumulation:
         if rows:
             self._add(Rows.of(rows))
 
-    @one_thread()
     def _with(self, late: list[Row]) -> RegressionData:
         run = deepcopy(self.run, {id(self.run.correction): self.run.correction})
         if late:
@@ -154,6 +152,7 @@ class Accumulation:
 
     # ------------------------------------------------------------------ on the second thread
 
+    @one_thread()
     def _handed_over(self, rows: list[Row], covariance: NDArray) -> Result:
         if rows:
             self._add(Rows.of(rows))

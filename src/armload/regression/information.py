@@ -17,6 +17,7 @@ from armload.regression.block_means import BLOCK, BlockMeans
 from armload.regression.features import JointFeatures
 from armload.regression.mismatch import Correction
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Rows
+from armload.runtime.one_thread import one_thread
 
 # [blocks] weight of the prior long-run variance: of so few values a variance is known to 70 % only
 _PRIOR_COUNT = 4.0
@@ -95,6 +96,7 @@ class RegressionData:
             self._regression = FilteredRegression(self.correction.arm, self.gain, *parts)
         self.take(self._regression.rows(t, q, dq, tau))
 
+    @one_thread()
     def take(self, rows: Rows) -> None:
         """Take rows of the same unknowns, in the order of their times."""
         rooted = np.sqrt(rows.weights)[:, :, None] * np.concatenate([rows.X, rows.r[:, :, None]], axis=2)
