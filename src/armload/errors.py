@@ -32,6 +32,10 @@ class RecordingError(ArmloadError, ValueError):
     """A log that is missing, unreadable, malformed or not plausible for the arm."""
 
 
+class NoEpisodesError(RecordingError):
+    """A file without episodes, of which one was named."""
+
+
 class EpisodesError(RecordingError):
     """A file of several episodes, of which none was named; `episodes` are those there are."""
 

@@ -166,6 +166,11 @@ def test_log_and_tare_may_be_episodes_of_one_file(logs, capsys, monkeypatch):
     code, out, err = run(capsys, "identify", "both.parquet", "--tare", "both.parquet", *episodes, *ROBOT, "--json")
     assert code == 0, err
     np.testing.assert_allclose(json.loads(out)["phi"], expected, rtol=0, atol=1e-9)
+    code, out, err = run(
+        capsys, "identify", "both.parquet", "--tare", "tare.csv", "--episode", "1", *ROBOT, "--json"
+    )  # a tare without episodes is read whole
+    assert code == 0, err
+    np.testing.assert_allclose(json.loads(out)["phi"], expected, rtol=0, atol=1e-9)
     code, _, err = run(capsys, "motion", "check", "both.parquet", "--tare", "both.parquet", *episodes, *ROBOT[:2])
     assert code in (0, 3), err
 

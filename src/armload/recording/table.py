@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.errors import EpisodesError, RecordingError
+from armload.errors import EpisodesError, NoEpisodesError, RecordingError
 from armload.recording.aliases import EPISODE, QUANTITIES, TIME_UNITS
 from armload.recording.checked import Chunks
 from armload.recording.choice import DATE, TimeColumns
@@ -166,7 +166,7 @@ class _Reading:
         elif spec.episode is None:
             keep = np.ones(len(raw), dtype=bool)
         else:
-            raise RecordingError(f"{where} has no column {EPISODE!r}, and so no episodes: leave --episode out")
+            raise NoEpisodesError(f"{where} has no column {EPISODE!r}, and so no episodes: leave --episode out")
         rows = np.flatnonzero(keep)
         if time is None:
             assert spec.rate is not None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from armload.app.cli.arguments import AS_NAMED, COLUMN_OPTIONS
 from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.printing import print_note
-from armload.errors import RecordingError, UsageError
+from armload.errors import NoEpisodesError, RecordingError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -77,7 +77,7 @@ def read_logs(
         log, tare: paths.
         topics: of each (default: `--topic`).
     """
-    from armload.recording import has_topics, read_recording
+    from armload.recording import has_topics
 
     of_tare = [getattr(options, name, None) for name in ("tare_columns", "tare_episode")]
     if of_tare != [None, None] and options.tare is None:
@@ -92,7 +92,7 @@ def read_logs(
         topic = (topics or (getattr(options, "topic", None),) * 2)[k]
         topic = topic if bags[k] or not any(bags) else None
         try:
-            read[k] = read_recording(path, arm, topic=topic, columns=columns)
+            read[k] = _read(path, arm, topic, columns, of_the_other=k == 1 and not own)
         except RecordingError as error:
             if k == 1 and not own and columns is not None and _reads(path, arm):
                 raise RecordingError(
@@ -100,6 +100,18 @@ def read_logs(
                 ) from None
             raise
     return read[0], read[1]
+
+
+def _read(path: str, arm: Arm, topic: str | None, columns: ColumnSpec | None, of_the_other: bool) -> Recording:
+    """A log; one without episodes is read whole if the episode that is named is `of_the_other`."""
+    from armload.recording import read_recording
+
+    try:
+        return read_recording(path, arm, topic=topic, columns=columns)
+    except NoEpisodesError:
+        if columns is None or not of_the_other:
+            raise
+        return read_recording(path, arm, topic=topic, columns=replace(columns, episode=None))
 
 
 def _reads(path: str, arm: Arm) -> bool:
