@@ -13,6 +13,7 @@ from armload.motion import random_motion
 from armload.recording import write_recording
 from armload.simulation import simulate_inverse
 from armload.survey import Settings, find_logs, read_rows, survey
+from armload.survey.remarks import of_copies
 
 SETTINGS = Settings("panda", method="map")
 
@@ -138,6 +139,13 @@ def test_a_damaged_table_with_its_cells_is_written_anew(logs, tmp_path):
         out.write_bytes(damaged)
         assert said_of([logs], out)[0].anew == 0
         assert out.read_bytes() == whole
+
+
+def test_copies_are_counted_as_the_survey_counts_logs_each_episode_for_one():
+    a, b = ([(name, k, x) for k, x in enumerate(contents)] for name, contents in (("a", "xyz"), ("b", "x-z")))
+    said = of_copies([*a, *b, ("c", None, "x"), ("d", None, "x")])
+    assert said.startswith("3 logs are copies of others, byte for byte, packed or not (b (2 episodes) of a, d of c): ")
+    assert of_copies([*a, ("b", 0, ""), ("c", 0, "")]) == ""
 
 
 @pytest.mark.full  # some seconds

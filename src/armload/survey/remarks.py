@@ -81,16 +81,22 @@ def of_bags(logs: Iterable[tuple[str, Sequence[Path]]]) -> str:
 def of_copies(contents: Iterable[tuple[str, int | None, str]]) -> str:
     """The sentence on logs (name, episode, content) that are others byte for byte; empty: there are none."""
     first: dict[tuple[int | None, str], str] = {}
-    copies: dict[str, str] = {}
+    copies: dict[tuple[str, str], list[int | None]] = {}
     for name, episode, content in contents:
         original = first.setdefault((episode, content), name)
         if content and original != name:
-            copies.setdefault(name, original)
+            copies.setdefault((name, original), []).append(episode)
     if not copies:
         return ""
-    logs = "1 log is a copy" if len(copies) == 1 else f"{len(copies)} logs are copies"
-    some = _some([f"{name} of {original}" for name, original in copies.items()])
+    count = sum(map(len, copies.values()))
+    logs = "1 log is a copy" if count == 1 else f"{count} logs are copies"
+    some = _some([f"{_named(name, of)} of {original}" for (name, original), of in copies.items()])
     return f"{logs} of others, byte for byte, packed or not ({some}): each counts as a log of its own"
+
+
+def _named(name: str, episodes: Sequence[int | None]) -> str:
+    """A log, or so many episodes of a data set."""
+    return name if episodes == [None] else f"{name} ({len(episodes)} episode{'s' * (len(episodes) > 1)})"
 
 
 def _some(names: Sequence[str]) -> str:
