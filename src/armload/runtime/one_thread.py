@@ -1,7 +1,7 @@
 """One thread for the products of small matrices.
 
-BLAS spreads each product over all cores, and the threads wait busily for the next: for matrices of a few hundred rows
-that costs ten times the processor time on two cores, and up to 100 × the time on a busy machine.
+BLAS spreads each product over all cores, and the threads wait busily for each other: for matrices of a few hundred rows
+that costs ten times the processor time where two cores have other work, and brings next to nothing where they have not.
 """
 
 from __future__ import annotations
