@@ -4,7 +4,10 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 from armload.errors import ArmloadError, UsageError
 from armload.recording import read_recording
@@ -109,7 +112,47 @@ def test_a_bag_is_one_log_and_a_data_set_one_for_each_episode(folder):
     bag, *episodes = find_logs([str(folder / "bag"), str(folder / "set")])
     assert len(bag.files) == 3
     assert [log.episode for log in episodes] == [0, 1]
-    assert [log.files[1].name for log in episodes] == ["episode_000000.parquet", "episode_000001.parquet"]
+    assert [log.files[0].name for log in episodes] == ["episode_000000.parquet", "episode_000001.parquet"]
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_episode_keeps_its_content_while_its_data_set_grows(tmp_path, version):
+    """LeRobot adds episodes to meta/info.json and, from version 3 on, to the Parquet file of those before."""
+    template = f"data/chunk-000/{'episode_{episode_index:06d}' if version == 2 else 'file-{file_index:03d}'}.parquet"
+    folder, info = tmp_path / "set", {"data_path": template, "features": {"q": {"names": ["a", "b"]}}}
+    for sub in ("meta/episodes", "data/chunk-000"):
+        (folder / sub).mkdir(parents=True)
+
+    def written(rows, rows_of_a_group=1000, **more):
+        """The contents of a data set of so many episodes; rows (E, 5, 2)."""
+        (folder / "meta" / "info.json").write_text(json.dumps(info | {"total_episodes": len(rows)} | more))
+        parts = [
+            pa.table(
+                {
+                    "episode_index": np.full(5, k),
+                    "q": pa.FixedSizeListArray.from_arrays(part.ravel(), 2),
+                    "task": [f"task {k}"] * 5,
+                }
+            )
+            for k, part in enumerate(rows)
+        ]
+        for k, part in enumerate(parts if version == 2 else [pa.concat_tables(parts)]):
+            name = template.format(episode_index=k, file_index=0)
+            parquet.write_table(part, folder / name, row_group_size=rows_of_a_group)
+        index = [{"episode_index": k, "data/chunk_index": 0, "data/file_index": 0} for k in range(len(rows))]
+        parquet.write_table(pa.Table.from_pylist(index), folder / "meta/episodes/0.parquet")
+        return [log.content() for log in find_logs([str(folder)])]
+
+    rows = np.random.default_rng(0).normal(size=(4, 5, 2))
+    before = written(rows[:3])
+    assert len(set(before)) == 3
+    assert written(rows)[:3] == before
+    assert written(rows, rows_of_a_group=7)[:3] == before
+    other = rows.copy()
+    other[1, 2, 0] += 1e-9
+    assert [a == b for a, b in zip(written(other), before, strict=False)] == [True, False, True]
+    renamed = written(rows, features={"q": {"names": ["b", "a"]}})
+    assert not set(renamed) & set(before)
 
 
 def test_a_bag_without_its_metadata_is_one_log_of_the_arm_that_it_lies_with(folder):

@@ -16,7 +16,7 @@ from armload.recording.files import (
     read_recording,
     write_recording,
 )
-from armload.recording.lerobot import data_set_episodes, is_data_set
+from armload.recording.lerobot import data_set_columns, data_set_episodes, digests_of_episodes, is_data_set
 from armload.recording.recording import BLOCK, CHANNELS, GAP, JITTERED, Recording, Sample
 from armload.recording.spooled import blocks, largest, parts_of, span
 from armload.recording.steadied import steadied, with_velocities_of_positions
@@ -41,8 +41,10 @@ __all__ = [
     "arm_as_set",
     "blocks",
     "check_own_measurements",
+    "data_set_columns",
     "data_set_episodes",
     "digest_of",
+    "digests_of_episodes",
     "endless",
     "has_topics",
     "is_data_set",

@@ -8,13 +8,17 @@ Source: huggingface/lerobot, `datasets/lerobot_dataset.py` and `datasets/utils.p
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from armload.arms import Arm
 from armload.errors import EpisodesError, RecordingError, one_line
+from armload.recording.aliases import EPISODE
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.header import read_name
 from armload.recording.parquet_file import pyarrow_for, read_parquet
@@ -56,6 +60,40 @@ def data_set_episodes(path: str | Path) -> dict[int, Path]:
     path = Path(path)
     info = _info(path)
     return {episode: _file(path, info, places) for episode, places in _places(path, str(path), info).items()}
+
+
+def data_set_columns(path: str | Path) -> str:
+    """What a LeRobot data set says of its columns in meta/info.json, which the reading of every episode depends on.
+
+    Raises:
+        RecordingError: meta/info.json cannot be read.
+    """
+    return json.dumps(_info(Path(path)).get("features"), sort_keys=True)
+
+
+def digests_of_episodes(file: Path) -> dict[int, str]:
+    """SHA-256 of the rows of each episode of a Parquet file: they stay when episodes are added to the file.
+
+    Pictures count for nothing. What a damaged file raises is pyarrow's.
+    """
+    pa, parquet = pyarrow_for(file)
+    kept = [field.name for field in parquet.read_schema(file) if not _holds_bytes(pa, field.type)]
+    table = parquet.read_table(file, columns=kept, use_threads=False).replace_schema_metadata()
+    episodes = table.column(EPISODE).to_numpy()
+    starts = np.flatnonzero(np.diff(episodes, prepend=np.nan))  # of stretches of rows of one episode
+    found: dict[int, Any] = {}
+    for start, stop in zip(starts, [*starts[1:], len(episodes)], strict=True):
+        digest = found.setdefault(int(episodes[start]), hashlib.sha256())
+        for name, column in zip(kept, table.slice(start, stop - start).columns, strict=True):
+            values = pa.concat_arrays(column.chunks)  # however the file parts its rows
+            digest.update(f"{name} {values.type}".encode())
+            digest.update(pa.RecordBatch.from_arrays([values], [name]).serialize())
+    return {episode: digest.hexdigest() for episode, digest in found.items()}
+
+
+def _holds_bytes(pa: Any, kind: Any) -> bool:
+    """Whether a column is of pictures, or of something else that is no number, text or list of them."""
+    return pa.types.is_struct(kind) or pa.types.is_binary(kind) or pa.types.is_large_binary(kind)
 
 
 def _places(path: Path, where: str, info: Mapping[str, Any]) -> dict[int, dict[str, int]]:

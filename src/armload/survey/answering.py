@@ -13,7 +13,8 @@ from threadpoolctl import threadpool_limits
 from armload.errors import ArmloadError, EpisodesError, RecordingError, one_line
 from armload.identification import identify
 from armload.runtime.version import __version__
-from armload.survey.logs import NO_FILE, Log, is_special
+from armload.survey.content import NO_FILE, is_special
+from armload.survey.logs import Log
 from armload.survey.rows import UNUSABLE, answered, unusable
 from armload.survey.settings import Settings
 from armload.survey.sliding import slides_of_parts

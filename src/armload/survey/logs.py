@@ -6,21 +6,19 @@ episode of a LeRobot data set.
 
 from __future__ import annotations
 
-import errno
 import glob
 import hashlib
 import os
 import re
-import stat
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from armload.errors import ArmloadError, UsageError
 from armload.recording import (
     LOG_SUFFIXES,
     PACKED_SUFFIXES,
+    data_set_columns,
     data_set_episodes,
     is_data_set,
     is_log,
@@ -28,10 +26,9 @@ from armload.recording import (
     log_in,
 )
 from armload.recording.bag_parts import PART_SUFFIXES
+from armload.survey.content import episode_hash, file_hash, is_special
 from armload.survey.remarks import may_be_log, of_passed
 from armload.survey.stores import WILD, is_url, logs_in, stamp_of
-
-NO_FILE = "it is a pipe, a socket or a device: expected a regular file; copy what it gives into one"
 
 
 @dataclass(frozen=True)
@@ -40,13 +37,14 @@ class Log:
 
     name: path or URL, as it was found. arm: whose log it is; empty: nobody's.
     episode: of a data set; None: whatever the file holds.
-    files: whose content the answer depends on; of a URL none.
+    files: whose content the answer depends on; of a URL none. columns: what a data set says of its columns elsewhere.
     """
 
     name: str
-    arm: str
+    arm: str = ""
     episode: int | None = None
     files: tuple[Path, ...] = ()
+    columns: str = ""
 
     @property
     def remote(self) -> bool:
@@ -56,7 +54,7 @@ class Log:
     @property
     def there(self) -> bool:
         """Whether any of its files is there; of an object nobody knows before it is fetched."""
-        return self.remote or any(file.exists() for file in self.files)
+        return self.remote or self.episode is not None or any(file.exists() for file in self.files)
 
     def stamp(self) -> str:
         """What changes with the content and is known without reading it: sizes and times, or the store's own key.
@@ -67,17 +65,19 @@ class Log:
         if self.remote:
             return stamp_of(self.name)
         seen = [(str(file), (about := file.stat()).st_size, about.st_mtime_ns) for file in self.files]
-        return hashlib.sha256(repr(seen).encode()).hexdigest()
+        return hashlib.sha256((repr(seen) + self.columns).encode()).hexdigest()
 
     def content(self) -> str:
-        """SHA-256 of the content; of an object the store's own key, which changes with it.
+        """SHA-256 of the content, of an episode's rows; of an object the store's own key, which changes with it.
 
         Raises:
             OSError: a file cannot be read.
         """
         if self.remote:
             return self.stamp()
-        return hashlib.sha256("".join(file_hash(file) for file in self.files).encode()).hexdigest()
+        of = self.episode
+        parts = [file_hash(file) if of is None else episode_hash(file, of) for file in self.files]
+        return hashlib.sha256("".join([*parts, self.columns]).encode()).hexdigest()
 
     @property
     def packed(self) -> bool:
@@ -98,24 +98,6 @@ def cells_of(table: str | Path) -> Path:
     """The folder of a survey's cells, beside its table."""
     table = Path(table)
     return table.with_name(f"{table.name}.cells")
-
-
-def file_hash(file: Path) -> str:
-    """SHA-256 of a file, which is not hashed again while its size and time stay.
-
-    Raises:
-        OSError: it cannot be read, or is no regular file.
-    """
-    about = file.stat()
-    if _special(about.st_mode):
-        raise OSError(errno.EINVAL, NO_FILE, str(file))
-    return _hash(file, about.st_size, about.st_mtime_ns)
-
-
-@lru_cache(maxsize=4096)
-def _hash(file: Path, _size: int, _time: int) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def find_logs(
@@ -140,8 +122,8 @@ def find_logs(
     found: dict[tuple[str, int | None], Log] = {}
     passed = set() if passed is None else passed
     for path in _expanded(paths, passed):
-        for name, episode, files in _units(path, hidden, passed):
-            found.setdefault((name, episode), Log(name, _arm(name, pattern), episode, files))
+        for log in _units(path, hidden, passed):
+            found.setdefault((log.name, log.episode), replace(log, arm=_arm(log.name, pattern)))
     passed -= {name for name, _ in found}  # one may have been named itself
     if not found:
         expected = f"expected files with the suffix {', '.join(LOG_SUFFIXES)}, or data sets"
@@ -211,21 +193,21 @@ def _lines(file: Path) -> list[str]:
     return [line for line in lines if line and not line.startswith("#")]
 
 
-def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
-    """Name, episode and files of every unit behind a path.
+def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[Log]:
+    """Every unit behind a path, of no arm yet.
 
     hidden: real paths that are passed over (`Path.resolve` raises of a loop of links); a folder is one from then on.
     passed: as of `find_logs`.
     """
     here = Path(path)
     if is_url(path):
-        yield path, None, ()
+        yield Log(path)
     elif not here.is_dir() or (inside := _inside(here)) is None:
-        yield path, None, (here,)
+        yield Log(path, files=(here,))
     elif is_data_set(here):
         yield from _episodes(here)
     elif _is_bag(here, inside):
-        yield str(here), None, tuple(file for file in inside if file.is_file())
+        yield Log(str(here), files=tuple(file for file in inside if file.is_file()))
     elif (real := os.path.realpath(here)) not in hidden:
         hidden.add(real)
         for inner in inside:
@@ -245,30 +227,18 @@ def _inside(folder: Path) -> list[Path] | None:
         return None
 
 
-def is_special(path: Path) -> bool:
-    """Whether this is a pipe, a socket or a device, through links, too: to open one may wait for ever."""
-    try:
-        return _special(path.stat().st_mode)
-    except OSError:  # a link to nothing: its row will say so
-        return False
-
-
-def _special(mode: int) -> bool:
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
-
-
 def of_survey(path: Path) -> bool:
     """Whether this is the table of a survey, or its folder of cells (`cells_of`)."""
     table = path.with_suffix("") if path.suffix == ".cells" else path
     return table.is_file() and cells_of(table).is_dir()
 
 
-def _episodes(folder: Path) -> Iterator[tuple[str, int | None, tuple[Path, ...]]]:
-    info = folder / "meta" / "info.json"
+def _episodes(folder: Path) -> Iterator[Log]:
+    """Each episode by its own rows and columns: meta/info.json also counts episodes, and changes with each new one."""
     try:
-        episodes = data_set_episodes(folder)
+        episodes, columns = data_set_episodes(folder), data_set_columns(folder)
     except ArmloadError:  # its one row will say why
-        yield str(folder), None, (info,)
+        yield Log(str(folder), files=(folder / "meta" / "info.json",))
         return
     for episode, file in episodes.items():
-        yield str(folder), episode, (info, file)
+        yield Log(str(folder), "", episode, (file,), columns)

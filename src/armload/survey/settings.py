@@ -16,7 +16,8 @@ from armload.payloads import Payload
 from armload.posterior import HybridModel, Profile, load_profile
 from armload.recording import ColumnSpec, Recording, read_long
 from armload.runtime.version import __version__
-from armload.survey.logs import Log, file_hash
+from armload.survey.content import file_hash
+from armload.survey.logs import Log
 from armload.survey.rows import columns
 
 _ARM = "{arm}"
