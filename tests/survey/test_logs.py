@@ -153,6 +153,14 @@ def test_an_episode_keeps_its_content_while_its_data_set_grows(tmp_path, version
     assert [a == b for a, b in zip(written(other), before, strict=False)] == [True, False, True]
     renamed = written(rows, features={"q": {"names": ["b", "a"]}})
     assert not set(renamed) & set(before)
+    file = folder / template.format(episode_index=0, file_index=0)
+    file.write_bytes(file.read_bytes()[:100])
+    damaged = find_logs([str(folder)])[0].content()
+    assert damaged not in renamed
+    file.unlink()
+    os.mkfifo(file)  # which nobody reads: to open it would wait for ever
+    with pytest.raises(OSError, match="it is a pipe"):
+        find_logs([str(folder)])[0].content()
 
 
 def test_a_bag_without_its_metadata_is_one_log_of_the_arm_that_it_lies_with(folder):

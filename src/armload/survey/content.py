@@ -33,10 +33,15 @@ def file_hash(file: Path) -> str:
     Raises:
         OSError: it cannot be read, or is no regular file.
     """
+    return _hash(file, *_version(file))
+
+
+def _version(file: Path) -> tuple[int, int]:
+    """Size and time of a regular file."""
     about = file.stat()
     if _special(about.st_mode):
         raise OSError(errno.EINVAL, NO_FILE, str(file))
-    return _hash(file, about.st_size, about.st_mtime_ns)
+    return about.st_size, about.st_mtime_ns
 
 
 @lru_cache(maxsize=4096)
@@ -51,9 +56,9 @@ def episode_hash(file: Path, episode: int) -> str:
     Raises:
         OSError: the file cannot be read, or is no regular file.
     """
-    about = file.stat()
+    version = _version(file)
     with _ONE:
-        found = _episodes(file, about.st_size, about.st_mtime_ns)
+        found = _episodes(file, *version)
     return found.get(episode) or file_hash(file)
 
 
