@@ -64,6 +64,16 @@ def test_limits_know_which_joints_slide(lift, panda):
     assert panda.limits.slides.tolist() == [False] * 7
 
 
+@pytest.mark.parametrize("low", [-9.0, 0.0, 4.0])
+def test_a_random_motion_keeps_to_a_rail_wherever_it_begins(low):
+    arm_on_rail = Arm("rail", LIFT.replace('lower="0.0" upper="0.6"', f'lower="{low}" upper="{low + 2.0}"'))
+    motion = random_motion(arm_on_rail, seed=1, duration=4.0)
+    q = motion(np.linspace(0.0, 4.0, 400))[0][:, 0]
+    assert low <= q.min() < q.max() <= low + 2.0
+    assert np.ptp(q) > 0.1
+    assert check_motion(arm_on_rail, motion).ok
+
+
 def test_a_sentence_on_a_limit_of_a_sliding_joint_is_in_metres_and_newtons(lift):
     found = check_motion(lift, moved(0.9, 3.0, seconds=0.4), payload_radius=0.0)
     for part in (

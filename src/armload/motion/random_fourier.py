@@ -108,13 +108,15 @@ def random_motion(
 
 
 def filled_limits(limits: Limits) -> Limits:
-    """The limits with an assumed number wherever the maker gives none; positions within one turn."""
+    """The limits with an assumed number wherever the maker gives none; joints that turn stay within one turn."""
+    low, high = limits.position_low, limits.position_high
+    rail = limits.slides & np.isfinite(low) & np.isfinite(high)  # which may begin anywhere
     velocity = np.where(np.isfinite(limits.velocity), limits.velocity, _SPEED)
     acceleration = np.where(np.isfinite(limits.acceleration), limits.acceleration, velocity / _TO_SPEED)
     jerk = np.where(np.isfinite(limits.jerk), limits.jerk, acceleration / _TO_PUSH)
     return Limits(
-        np.maximum(limits.position_low, -np.pi),
-        np.minimum(limits.position_high, np.pi),
+        np.where(rail, low, np.maximum(low, -np.pi)),
+        np.where(rail, high, np.minimum(high, np.pi)),
         velocity,
         limits.effort,
         acceleration,
