@@ -144,7 +144,7 @@ def test_a_damaged_table_with_its_cells_is_written_anew(logs, tmp_path):
 def test_copies_are_counted_as_the_survey_counts_logs_each_episode_for_one():
     a, b = ([(name, k, x) for k, x in enumerate(contents)] for name, contents in (("a", "xyz"), ("b", "x-z")))
     said = of_copies([*a, *b, ("c", None, "x"), ("d", None, "x")])
-    assert said.startswith("3 logs are copies of others, byte for byte, packed or not (b (2 episodes) of a, d of c): ")
+    assert said.startswith("3 logs are copies of others, packed or not (b (2 episodes) of a, d of c): ")
     assert of_copies([*a, ("b", 0, ""), ("c", 0, "")]) == ""
 
 
@@ -158,7 +158,7 @@ def test_copies_of_a_log_are_said_to_be_there_and_broken_files_are_none(logs, tm
     found, said = said_of([logs], tmp_path / "out.csv")
     (line,) = [line for line in said if "cop" in line]
     assert line.startswith(
-        f"3 logs are copies of others, byte for byte, packed or not ({logs}/0.csv.gz of {logs}/0.csv, "
+        f"3 logs are copies of others, packed or not ({logs}/0.csv.gz of {logs}/0.csv, "
         f"{logs}/copy of 0.csv of {logs}/0.csv, "
     )
     assert f"{logs}/link.csv of {logs}/1.csv" in line

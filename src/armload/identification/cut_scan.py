@@ -23,7 +23,6 @@ from armload.posterior.scales import Scales
 from armload.regression import JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH
-from armload.runtime.one_thread import one_thread
 
 Told = tuple[NDArray[np.float64], NDArray[np.float64]]  # Λ and h
 
@@ -49,10 +48,9 @@ class Unchanged:
     ) -> None:
         self._stretches = [stretch.of_features(features) for stretch in stretches]
         whole = RegressionData.joined(self._stretches)
-        with one_thread():
-            problem = Problem([*known, whole], prior_std, None, SMOOTH, same=True)
-            scales = problem.scales(scales)
-            self._found = problem.posterior(scales)
+        problem = Problem([*known, whole], prior_std, None, SMOOTH, same=True)
+        scales = problem.scales(scales)
+        self._found = problem.posterior(scales)
         self._E, self._S = problem.selections[-1], scales.noise[-1]
         shared = np.broadcast_to(self._E @ self._found.mean, (len(self._S), len(self._E)))
         self._at = np.concatenate([shared, self._found.weights], axis=1)  # x̂ (n, size)

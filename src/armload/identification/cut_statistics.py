@@ -42,7 +42,6 @@ from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH, NoiseModel
 from armload.regression.prior import BODY_SIZES, body_root
 from armload.regression.rows_of_log import RowsOfLog
-from armload.runtime.one_thread import one_thread
 
 # of joint torque sensors: what is left of vibration looks like a change where it is taken to be less. What motor
 # currents leave is friction mostly: with this, two of 24 small changes more were missed, and three of 96 sound logs
@@ -239,9 +238,8 @@ def _without_payload(runs: Sequence[RegressionData], arm: Arm, start: Scales | N
     """
     if not runs:
         return []
-    with one_thread():
-        problem = Problem(list(runs), payload_prior_std(arm), None, SMOOTH, same=True)
-        phi = problem.posterior(problem.scales(start)).mean[:10]
+    problem = Problem(list(runs), payload_prior_std(arm), None, SMOOTH, same=True)
+    phi = problem.posterior(problem.scales(start)).mean[:10]
     out = []
     for data in runs:
         own = copy(data)

@@ -79,7 +79,7 @@ def of_bags(logs: Iterable[tuple[str, Sequence[Path]]]) -> str:
 
 
 def of_copies(contents: Iterable[tuple[str, int | None, str]]) -> str:
-    """The sentence on logs (name, episode, content) that are others byte for byte; empty: there are none."""
+    """The sentence on logs (name, episode, content) with the content of others; empty: there are none."""
     first: dict[tuple[int | None, str], str] = {}
     copies: dict[tuple[str, str], list[int | None]] = {}
     for name, episode, content in contents:
@@ -91,7 +91,7 @@ def of_copies(contents: Iterable[tuple[str, int | None, str]]) -> str:
     count = sum(map(len, copies.values()))
     logs = "1 log is a copy" if count == 1 else f"{count} logs are copies"
     some = _some([f"{_named(name, of)} of {original}" for (name, original), of in copies.items()])
-    return f"{logs} of others, byte for byte, packed or not ({some}): each counts as a log of its own"
+    return f"{logs} of others, packed or not ({some}): each counts as a log of its own"
 
 
 def _named(name: str, episodes: Sequence[int | None]) -> str:
