@@ -416,7 +416,8 @@ def test_a_state_does_not_grow(panda, online, tmp_path):
         for sample in long:
             online.update(sample.t + 10.0 * turn, *sample[1:])
         sizes.append(online.save(tmp_path / f"{turn}.npz").stat().st_size)
-    assert sizes[2] <= sizes[1] + 200_000  # rows that wait to be handed over come and go
+    # a hundred rows that wait to be handed over, 1.4 MB, come and go; those of a turn would be 4 MB
+    assert sizes[2] <= sizes[1] + 1_500_000
 
 
 def test_a_state_of_another_arm_or_no_state_is_refused(panda, online, log, tmp_path):

@@ -19,6 +19,10 @@ C_j and slope_j are changed for some rows at once; until then c and u of these r
 One row of one joint costs R² + R·(10 + p) multiplications, a posterior from the accumulated information a thousand
 times as many: so the answer is always new, and only the scales wait for the next solution.
 
+C_j, slope_j, c and u are of single precision, half of the memory that a row has to pass. Nothing cancels there, as a
+row says little beside its noise (v is hardly above 1), and each solution begins them anew: what rounding leaves is less
+than a millionth of Λ (test_a_posterior_that_takes_rows_is_the_posterior_of_all_of_them).
+
 Source: recursive least squares by conditioning, Anderson & Moore 1979, ch. 5.
 """
 
@@ -35,8 +39,8 @@ from numpy.typing import NDArray
 from armload.regression.rows import Row
 from armload.runtime.kernels import kernel
 
-# [rows] whose changes of C and slope, a megabyte, are made at once: to read and write it costs more than the products.
-# A multiple of 4 (`_add`); changes no answer by more than rounding
+# [rows] whose changes of C and slope, half a megabyte, are made at once: to read and write it costs more than the
+# products. A multiple of 4 (`_add`); changes no answer by more than rounding
 _LATE = 8
 
 
@@ -44,9 +48,10 @@ _LATE = 8
 class SequentialPosterior:
     """The state of the recursion; `take` changes it in place.
 
-    C (n, R, R), own (n, R), slope (n, R, 10 + m): of the joints' own weights. shared_C (m, m), shared_own (m,),
-    shared_slope (m, 10): of what the joints share, s = [tares' payloads, eta]. Of C and shared_C only the lower
-    triangles count: half of what a row reads and writes. information Λ (10, 10), vector h (10,).
+    C (n, R, R), own (n, R), slope (n, R, 10 + m): of the joints' own weights; C and slope are made single. shared_C
+    (m, m), shared_own (m,), shared_slope (m, 10): of what the joints share, s = [tares' payloads, eta]. Of C and
+    shared_C only the lower triangles count: half of what a row reads and writes. information Λ (10, 10), vector h
+    (10,).
     noise: S (n,) [N²·m²·s]. tares: payloads of runs before this one, which the rows carry too: 0 or 1. drifts: how many
     unknowns of eta, the first ones, have a deviation of this session, which follows eta in s.
     order, active: a joint sees no friction but its own and no link before it, so that half of the columns of its slope
@@ -57,9 +62,9 @@ class SequentialPosterior:
     scale: (n,) what the last row was multiplied by.
     """
 
-    C: NDArray[np.float64]
+    C: NDArray[np.floating]
     own: NDArray[np.float64]
-    slope: NDArray[np.float64]
+    slope: NDArray[np.floating]
     shared_C: NDArray[np.float64]
     shared_own: NDArray[np.float64]
     shared_slope: NDArray[np.float64]
@@ -72,7 +77,7 @@ class SequentialPosterior:
     scale: NDArray[np.float64] = field(init=False)
     order: NDArray[np.int64] = field(init=False)
     active: NDArray[np.int64] = field(init=False)
-    late: NDArray[np.float64] = field(init=False)
+    late: NDArray[np.float32] = field(init=False)
     waiting: NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -80,8 +85,9 @@ class SequentialPosterior:
         known = (self.slope != 0.0).any(axis=1)
         self.order, self.active = np.argsort(~known, axis=1, kind="stable"), known.sum(axis=1)
         n, R, Z = self.slope.shape
-        self.late, self.waiting = np.zeros((n, _LATE, R + Z)), np.zeros(1, dtype=np.int64)
-        self.slope = np.ascontiguousarray(np.take_along_axis(self.slope, self.order[:, None], axis=2))
+        self.late, self.waiting = np.zeros((n, _LATE, R + Z), np.float32), np.zeros(1, dtype=np.int64)
+        self.slope = np.ascontiguousarray(np.take_along_axis(self.slope, self.order[:, None], axis=2), np.float32)
+        self.C = np.ascontiguousarray(self.C, np.float32)
 
     def take(self, row: Row) -> None:
         """Condition on one row of each joint."""
@@ -119,12 +125,12 @@ class SequentialPosterior:
 @kernel(fastmath={"contract", "reassoc", "nsz"})
 def _product(lower, x, c):  # pragma: no cover - compiled
     """c = C·x from the lower triangle of a symmetric C, four rows at once as far as they go."""
-    R = x.shape[0]
+    R, zero = x.shape[0], x.dtype.type(0)
     whole = R - R % 4
     for i in range(0, whole, 4):
         p, q, s, t = lower[i], lower[i + 1], lower[i + 2], lower[i + 3]
         xp, xq, xs, xt = x[i], x[i + 1], x[i + 2], x[i + 3]
-        cp = cq = cs = ct = 0.0
+        cp = cq = cs = ct = zero
         for k in range(i):
             cp += p[k] * x[k]
             cq += q[k] * x[k]
@@ -138,7 +144,7 @@ def _product(lower, x, c):  # pragma: no cover - compiled
                 c[k] += lower[a, k] * x[a]
             c[a] += lower[a, a] * x[a]
     for i in range(whole, R):
-        total = 0.0
+        total = zero
         for k in range(i):
             total += lower[i, k] * x[k]
             c[k] += lower[i, k] * x[i]
@@ -183,7 +189,8 @@ def _condition(
     n, R, Z = C.shape[0], C.shape[1], slope.shape[2]
     m, K, wait = Z - 10, late.shape[1], waiting[0]
     known = X.shape[1] - R  # 10 + p
-    x, z, some, c, w = np.empty(R), np.empty(Z), np.empty(Z), np.empty(max(R, m)), np.empty(10)
+    x, some, c = np.empty(R, np.float32), np.empty(Z, np.float32), np.empty(R, np.float32)
+    z, shared_c, w = np.empty(Z), np.empty(m), np.empty(10)
     shared = np.zeros((n + 3 - (n + 3) % 4, m + 10))  # changes of what the joints share, a multiple of 4
     for j in range(n):
         a = scale[j]
@@ -199,7 +206,7 @@ def _condition(
             z[k] = 0.0  # of other sessions
         e, v = a * r[j], 1.0
         for i in range(R):
-            x[i] = a * X[j, known + i]
+            x[i] = np.float32(a * X[j, known + i])
         many, at = active[j], order[j]
         for k in range(many, Z):  # a column that has been zero so far
             if z[at[k]] != 0.0:
@@ -207,11 +214,11 @@ def _condition(
                 many += 1
         active[j] = many
         for k in range(many):
-            some[k] = z[at[k]]
+            some[k] = np.float32(z[at[k]])
         _product(C[j], x, c)
         _take_off(slope[j], x, some, many)
         for p in range(wait):
-            change, g = late[j, p], 0.0
+            change, g = late[j, p], np.float32(0.0)
             for i in range(R):
                 g += change[i] * x[i]
             for i in range(R):
@@ -224,15 +231,15 @@ def _condition(
         for k in range(many):
             z[at[k]] = some[k]
         if condition:
-            change, root = late[j, wait], 1.0 / math.sqrt(v)
+            change, root = late[j, wait], np.float32(1.0 / math.sqrt(v))
             for i in range(R):
                 own[j, i] += c[i] / v * e
                 change[i] = root * c[i]
             for k in range(Z):
-                change[R + k] = root * some[k] if k < many else 0.0
+                change[R + k] = root * some[k] if k < many else np.float32(0.0)
             if wait + 1 == K:
                 _add(late[j], R, many, C[j], slope[j])
-        _product(shared_C, z[10:], c)
+        _product(shared_C, z[10:], shared_c)
         for k in range(10):
             w[k] = z[k]
         for i in range(m):
@@ -245,19 +252,19 @@ def _condition(
             for i in range(m):
                 g += change[i] * z[10 + i]
             for i in range(m):
-                c[i] -= g * change[i]
+                shared_c[i] -= g * change[i]
             for k in range(10):
                 w[k] -= g * change[m + k]
         for i in range(m):
-            v += z[10 + i] * c[i]
+            v += z[10 + i] * shared_c[i]
         seen[j, 10], seen[j, 11] = e, v
         for k in range(10):
             seen[j, k] = w[k]
         if condition:
             change, root = shared[j], 1.0 / math.sqrt(v)
             for i in range(m):
-                shared_own[i] += c[i] / v * e
-                change[i] = root * c[i]
+                shared_own[i] += shared_c[i] / v * e
+                change[i] = root * shared_c[i]
             for k in range(10):
                 change[m + k] = root * w[k]
                 vector[k] += w[k] * e / v

@@ -45,23 +45,27 @@ class BlockMeans:
 
     def extend(self, durations: NDArray[np.float64], values: NDArray[np.float64]) -> None:
         """Values (N, *shape) that stand for `durations` (N,) seconds each."""
+        self.extend_by(durations, lambda part: np.tensordot(durations[part], values[part], 1))
+
+    def extend_by(self, durations: NDArray[np.float64], integral: Callable[[slice], NDArray[np.float64]]) -> None:
+        """The same of values that need not be there: `integral` gives that of some of them, one after another."""
         first, time = 0, float(self._times[self._filled])
         for k, duration in enumerate(durations.tolist()):
             if time + 0.5 * duration >= self.block:
-                self._put(durations[first:k], values[first:k])
+                self._put(durations[first:k], integral(slice(first, k)))
                 first, time = k, 0.0
                 self._filled += 1
                 if self._filled == _MOST_BLOCKS:
                     self._join_pairs()
             time += duration
-        self._put(durations[first:], values[first:])
+        self._put(durations[first:], integral(slice(first, None)))
 
-    def _put(self, durations: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    def _put(self, durations: NDArray[np.float64], integral: NDArray[np.float64]) -> None:
         """Into the block being filled; its weight is that of its parts."""
         k, more = self._filled, float(durations.sum())
         if self._weights[k] != 1.0 and more > 0.0:
             self._weights[k] = (self._weights[k] * self._times[k] + more) / (self._times[k] + more)
-        self.sums[k] += np.tensordot(durations, values, 1)
+        self.sums[k] += integral
         self._times[k] += more
         self._count += int(np.count_nonzero(durations > 0))
 

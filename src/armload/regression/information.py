@@ -99,14 +99,23 @@ class RegressionData:
     @one_thread()
     def take(self, rows: Rows) -> None:
         """Take rows of the same unknowns, in the order of their times."""
-        rooted = np.sqrt(rows.weights)[:, :, None] * np.concatenate([rows.X, rows.r[:, :, None]], axis=2)
-        for j in range(self.correction.arm.n):
-            Xr = rooted[:, j] * np.sqrt(rows.h)[:, None]
+        root, (M, n, size) = np.sqrt(rows.weights * rows.h[:, None]), rows.X.shape
+        Xr = np.empty((M, size + 1))  # of one joint: what a row of all joints takes does not fit into a cache
+        for j in range(n):
+            np.multiply(root[:, j, None], rows.X[:, j], out=Xr[:, :-1])
+            np.multiply(root[:, j], rows.r[:, j], out=Xr[:, -1])
             products = Xr.T @ Xr
             self.A[j] += products[:-1, :-1]
             self.b[j] += products[:-1, -1]
             self.c[j] += products[-1, -1]
-        self.blocks.extend(rows.h, rooted)
+        times = np.sqrt(rows.weights) * rows.h[:, None]
+
+        def integral(part: slice) -> NDArray[np.float64]:
+            by_joint = times[part].T[:, None]
+            X, r = by_joint @ rows.X[part].swapaxes(0, 1), by_joint @ rows.r[part].T[..., None]
+            return np.concatenate([X, r], axis=2)[:, 0]
+
+        self.blocks.extend_by(rows.h, integral)
 
     @classmethod
     def joined(cls, parts: Sequence[RegressionData]) -> RegressionData:
