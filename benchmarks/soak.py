@@ -80,14 +80,16 @@ def slope(hours, megabytes):
     return float(line.slope), float(student.ppf(0.975, len(hours) - 2) * line.stderr)
 
 
-def summary(rows, rate, cpu, saves):
+def summary(rows, rate, cpu, states):
     noted = [(round(h, 2), round(float(m), 1)) for h, m in rows[:: max(1, len(rows) // NOTED)]]
     late = np.array([row for row in noted if row[0] >= 0.25 * rows[-1][0]])
     mean, half = slope(*late.T) if len(rows) >= 2 * NOTED else (None, None)
     return {
         "hours": rows[-1][0],
         "rate": rate,
-        "saves": saves,
+        "saves": len(states),
+        "state, mean [MB]": float(np.mean(states)),
+        "state, largest [MB]": max(states),
         "resident [MB]": {f"{h:.2f} h": m for h, m in noted},
         "last [MB]": rows[-1][1],
         "slope after the first quarter [MB/h]": mean,
@@ -111,7 +113,7 @@ def main():
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as beside:
         samples = beside.submit(simulated, REPEATED, options.steady, options.rate).result()
     session = Session(Again(samples, options.rate), arm("panda"), every=0.1)
-    minute, spoken, rows, saves, began, skipped = 1, 0.0, [], 0, 0.0, None
+    minute, spoken, rows, states, began, skipped = 1, 0.0, [], [], 0.0, None
     for estimate in session.estimates(3600.0 * options.hours):
         if estimate.t >= 10.0 and skipped is None:  # what is loaded and compiled once is no cost of an hour
             began, skipped = time.process_time(), estimate.t
@@ -119,12 +121,11 @@ def main():
             json.dumps(estimate.to_dict())
             spoken = estimate.t
         if estimate.t >= 60.0 * minute:
-            session.identifier.save(options.state)
-            saves += 1
+            states.append(session.identifier.save(options.state).stat().st_size / 1e6)
             rows.append((estimate.t / 3600.0, resident()))
             if minute % 15 == 0:
                 cpu = (time.process_time() - began) * estimate.t / (estimate.t - skipped)
-                result = summary(rows, options.rate, cpu, saves)
+                result = summary(rows, options.rate, cpu, states)
                 print(json.dumps(result), flush=True)
                 with replacing(out) as part:
                     part.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
