@@ -3,6 +3,10 @@
 import json
 import os
 import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -128,6 +132,39 @@ def test_a_task_whose_process_is_killed_each_time_is_said_to_be_lost(tmp_path):
     others = Task.of_one("of-9", "b", killed_at_first, tmp_path, 9, True)
     with pytest.raises(DatasetError, match="was killed 3 times"):
         run_tasks([wanted[0], others], tmp_path / "x", jobs=2)
+
+
+SPREAD = """
+import os, sys, time
+from armload.lab.engine import Engine
+
+def work(x):
+    print(os.getpid(), flush=True)
+    time.sleep(60.0)
+
+list(Engine(2).each(work, lambda: range(2)))
+"""
+
+
+def running(pid):
+    """Whether a process is there, and has not ended with nobody asking for it."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def test_processes_end_with_the_one_that_began_them(tmp_path):
+    (tmp_path / "spread.py").write_text(SPREAD, encoding="utf-8")
+    with subprocess.Popen([sys.executable, "spread.py"], cwd=tmp_path, stdout=subprocess.PIPE, text=True) as begun:
+        others = [int(begun.stdout.readline()) for _ in range(2)]
+        assert all(map(running, others))
+        begun.kill()
+        begun.stdout.close()
+    until = time.monotonic() + 30.0
+    while any(map(running, others)) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not any(map(running, others))
 
 
 def test_what_a_kill_leaves_of_a_file_is_no_cell(tmp_path):

@@ -3,20 +3,23 @@
 No scheduler or queue of our own: joblib or Dask gives out tasks one by one; what comes back comes as it is finished.
 A process that is killed costs the tasks that were running: they are given out again, at last each alone. Dask is asked
 itself, as joblib's backend for it keeps the number of workers that there were at first, runs everything here where
-that was one, and waits for ever for a scheduler that is gone.
+that was one, and waits for ever for a scheduler that is gone. Processes of joblib end with the one that began them,
+which joblib leaves open: they would finish their tasks beside those of whoever goes on, and then wait for minutes.
 """
 
 from __future__ import annotations
 
 import logging
+import os
 import re
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from armload.errors import ClusterError, UsageError
@@ -26,6 +29,7 @@ ATTEMPTS = 3
 _ADDRESS = re.compile(r"(tcp|tls|ucx)://\S+:\d+$")
 _WAIT = 30.0  # [s] for a cluster to answer
 _NO_WORKER = 300.0  # [s] without any worker: a queue of a batch system takes minutes
+_ALONE = 1.0  # [s] after which a process looks whether the one that began it is there
 _LOOK = 5.0  # [s] after which it is looked whether the scheduler is there, where nothing is finished meanwhile
 _GONE = "the cluster is gone: nothing that was finished is lost; start it and run the same command again to go on"
 _NONE: Any = object()
@@ -88,7 +92,7 @@ class Engine:
         with warnings.catch_warnings():
             # joblib says so when a process of its pool has ended; what was lost is given out again
             warnings.filterwarnings("ignore", message=".*A worker stopped while some jobs were given.*")
-            yield from parallel(n_jobs=jobs, **how)(delayed(_with_item)(work, item) for item in items)
+            yield from parallel(n_jobs=jobs, **how)(delayed(_with_item)(os.getpid(), work, item) for item in items)
 
     def _spread(self, work: Callable[[T], R], items: Iterable[T], killed: list[T]) -> Iterator[tuple[T, R]]:
         """As `each`, on the cluster; those whose worker was killed again and again come to stand in `killed`.
@@ -225,8 +229,22 @@ def _gone() -> Iterator[None]:
         raise ClusterError(_GONE) from None
 
 
-def _with_item(work: Callable[[T], R], item: T) -> tuple[T, R]:
+def _with_item(parent: int, work: Callable[[T], R], item: T) -> tuple[T, R]:
+    if os.getpid() != parent:
+        _end_with(parent)
     return item, work(item)
+
+
+@cache
+def _end_with(parent: int) -> None:
+    """End this process once the one that began it has ended, whatever it is doing."""
+
+    def look() -> None:
+        while os.getppid() == parent:
+            time.sleep(_ALONE)
+        os._exit(1)
+
+    threading.Thread(target=look, name="armload-parent", daemon=True).start()
 
 
 def _terminated() -> type[BaseException]:
