@@ -130,11 +130,8 @@ def objections(request: Request, motion: Motion, seed: int = 0) -> list[str]:
     if np.abs(q - request.start)[:, ~request.joints].max(initial=0.0) > 1e-9:
         out.append("a joint moves that may not")
     bounded = np.isfinite(limits.position_low) & np.isfinite(limits.position_high)
-    middle, half = (
-        (limits.position_low + limits.position_high)[bounded],
-        (limits.position_high - limits.position_low)[bounded],
-    )
-    must("position", q[:, bounded] - middle / 2, s * half / 2)
+    low, high = limits.position_low[bounded], limits.position_high[bounded]
+    must("position", q[:, bounded] - (low + high) / 2, s * (high - low) / 2)
     must("velocity of the positions", np.diff(q, axis=0) / h, s * limits.velocity)
     must("velocity", dq, s * limits.velocity)
     must("acceleration", np.diff(dq, axis=0) / h, s * limits.acceleration)
