@@ -177,6 +177,30 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_made(arguments, said, mot
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small.json"]
 
 
+@pytest.mark.full  # some seconds
+def test_sigterm_while_the_payload_is_mounted_ends_as_ctrl_c_does(motion, tmp_path):
+    logs = tmp_path / "logs"
+    command = [sys.executable, "-m", "armload", "measure", "sim", *QUICK, "--motion", motion, "--move"]
+    grip = "sh -c 'kill -TERM $PPID; sleep 5'"
+    done = subprocess.run([*command, "--dir", logs, "--grip", grip], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.splitlines()[-1] == "armload: interrupted"
+    assert f"--tare {logs / 'empty.csv'} goes on from there" in done.stderr.splitlines()[-2]
+    assert not (logs / "loaded.csv").exists()
+
+
+def test_without_standard_input_nobody_agrees_and_no_pipe_takes_its_place(motion, tmp_path):
+    program = (
+        "import os, sys; from armload.app.cli import main; code = main(sys.argv[1:]); "
+        "assert min(os.pipe()) > 2; sys.exit(code)"
+    )
+    arguments = ["measure", "sim", *QUICK, "--motion", motion, "--dir", str(tmp_path / "logs")]
+    command = ["sh", "-c", 'exec "$@" <&-', "sh", sys.executable, "-c", program, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "nothing was moved: nobody is at a terminal to agree" in done.stderr.splitlines()[-1]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.full)])
 @pytest.mark.full  # some seconds
 def test_what_is_ended_in_the_middle_leaves_a_log_that_can_be_read(number, motion, tmp_path):

@@ -261,6 +261,27 @@ def test_whatever_ends_it_the_arm_comes_to_rest_and_the_log_can_be_read(served):
 
 
 @in_time
+def test_a_robot_that_loses_its_power_ends_the_measurement_soon_with_a_sentence(served):
+    run = served.measure("--move", wait=False)
+    log = served.logs / "empty.csv"
+    until = time.monotonic() + 120.0
+    while not (log.exists() and served.said().count("moving") == 2):  # to the start, and then
+        assert time.monotonic() < until, served.said()
+        if run.poll() is not None:
+            err = run.communicate()[1]
+            in_vain(err)
+            pytest.fail(err)
+        time.sleep(0.02)
+    time.sleep(1.0)
+    served.process.kill()
+    out, err = run.communicate(timeout=40.0)  # that its client waits for the robot to come back is no matter
+    assert (run.returncode, out) == (2, "")
+    assert f"what was recorded until then is in {log}" in err.splitlines()[-1]
+    assert "Traceback" not in err
+    assert read_recording(log, served.robot).duration > 0.3
+
+
+@in_time
 def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served):
     out = served.folder / "answer.json"
     writes = ("--apply", "--mounted", "nothing", "--undetermined-inertia")

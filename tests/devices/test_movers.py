@@ -284,3 +284,50 @@ def test_an_arm_that_does_not_follow_is_never_taken_for_one_that_arrived(panda):
 def test_the_simulator_takes_no_payload_from_us(mover):
     with pytest.raises(SinkError, match="takes no payload"):
         mover.write(None)
+
+
+class Gap(Obedient):
+    """The 100th sample of a movement comes late, on its own clock and on ours."""
+
+    def __init__(self, robot, at, passed, waited):
+        super().__init__(robot, at)
+        self.now, self._count, self._gap = 0.0, 0, (passed, waited)
+
+    def __iter__(self):
+        for sample in super().__iter__():
+            self.now += CYCLE
+            self._count += 1
+            if self._count == 100:  # before the next sample is looked at
+                self.t += self._gap[0]
+                self.now += self._gap[1]
+            yield sample
+
+
+def moved_with_a_gap(panda, monkeypatch, passed, waited):
+    mover = Gap(panda, START, passed, waited)
+    clock = SimpleNamespace(monotonic=lambda: mover.now)
+    monkeypatch.setattr("armload.devices.mover.time", clock)
+    run(mover, MOTION)
+    assert not mover.moving
+    return mover, np.array(mover.targets)
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.4, 20.0])
+def test_an_arm_that_was_not_heard_stays_at_its_last_command(panda, monkeypatch, seconds):
+    mover, q = moved_with_a_gap(panda, monkeypatch, seconds, seconds)
+    assert f"no sample came for {seconds:.2f} s" in mover.why
+    here = q[100]
+    assert np.abs(np.diff(q[:100], axis=0)).max() > 1e-3  # it was on its way
+    np.testing.assert_allclose(q[101:], np.broadcast_to(here, q[101:].shape), atol=1e-9)
+    assert len(q) < 100 + 0.3 / CYCLE
+
+
+@pytest.mark.parametrize("passed", [-10.0, -0.3, 0.3, 10.0])
+def test_a_clock_that_jumps_stops_the_arm_on_its_path_without_a_jump(panda, monkeypatch, passed):
+    mover, q = moved_with_a_gap(panda, monkeypatch, passed, 0.0)
+    assert f"the clock of its samples jumped by {passed:+.2f} s" in mover.why
+    ordinary = np.abs(np.diff(np.array(MOTION.position(np.arange(0.0, 1.0, CYCLE))), axis=0)).max()
+    assert np.abs(np.diff(q, axis=0)).max() < 1.5 * ordinary
+    np.testing.assert_allclose(q[-1], q[-20], atol=1e-9)
+    path = MOTION.position(np.linspace(0.0, MOTION.duration, 6001))
+    assert np.abs(path - q[-1]).max(axis=1).min() < 1e-3

@@ -268,6 +268,76 @@ def test_a_movement_whose_end_was_not_seen_is_never_taken_for_a_whole_one(panda,
     assert len(read_recording(tmp_path / "loaded.csv", panda)) == 100
 
 
+class Silent(SimulatedMover):
+    """Its client waits for ever, from the 100th sample of a movement on: nothing comes, and no error."""
+
+    def ticking(self, _):
+        yield from (sample for sample, _ in zip(self, range(100), strict=False))
+        while True:
+            yield None
+
+
+def test_an_arm_whose_client_waits_for_ever_counts_as_lost(panda, simulated, tmp_path, monkeypatch):
+    monkeypatch.setattr("armload.devices.mover._LOST", 0.05)
+    mover, orders = simulated(kind=Silent), Orders()
+    with pytest.raises(SourceError, match=r"was lost: no sample for 0.05 s while the arm was on its way; .*empty.csv"):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
+    assert len(read_recording(tmp_path / "empty.csv", panda)) == 100
+
+
+class BackByALittle(SimulatedMover):
+    """The clock of its samples goes back by 50 ms on the way with the payload: too little to stop an arm."""
+
+    def __init__(self, *arguments, **settings):
+        super().__init__(*arguments, **settings)
+        self.samples, self._samples = self._samples, self.broken()
+        self.movements = self.count = 0
+
+    def follow(self, motion, thresholds=None):
+        super().follow(motion, thresholds)
+        self.movements, self.count = self.movements + 1, 0
+
+    def broken(self):
+        for sample in self.samples:
+            self.count += 1
+            back = 0.05 * (self.movements == 2 and self.count > 100)
+            yield sample._replace(t=sample.t - back)
+
+
+def test_a_part_of_a_run_is_never_taken_for_all_of_it(panda, simulated, tmp_path):
+    mover, orders = simulated(kind=BackByALittle), Orders()
+    with pytest.raises(RecordingError, match=r"went back on the way with the payload, .*loaded.csv, .*loaded.2.csv"):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, orders.mount(mover))
+
+
+def test_what_fails_after_the_empty_run_says_how_to_go_on_and_that_goes_on(panda, simulated, tmp_path):
+    def lose(_):
+        raise SourceError("the arm was lost")
+
+    mover, orders = simulated(kind=Restless, do=lose), Orders()
+    say = orders.seen.append
+    with pytest.raises(SourceError):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP, say=say).run(orders.consent, orders.mount(mover))
+    empty = tmp_path / "empty.csv"
+    assert orders.seen[-1] == f"the empty run is whole: once the payload is on, --tare {empty} goes on from there"
+    (tmp_path / "loaded.csv").unlink()
+    held = simulated(mounted=held_payload())
+    basis = Basis(read_recording(empty, panda), method="map")
+    found = Procedure(held, panda, MOTION, tmp_path, basis=basis).run(orders.consent, lambda: None)
+    assert found.answer.mass == pytest.approx(held_payload().parameters.mass, abs=0.08)
+
+
+def test_an_empty_run_that_fails_is_not_called_whole(panda, simulated, tmp_path):
+    def lose(_):
+        raise SourceError("the arm was lost")
+
+    mover, orders = simulated(kind=Restless, do=lose, at=NEAR), Orders()  # the second movement is the empty run
+    say = orders.seen.append
+    with pytest.raises(SourceError):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP, say=say).run(orders.consent, orders.mount(mover))
+    assert orders.seen[-1] == f"moving {EMPTY}"
+
+
 def test_an_arm_moved_meanwhile_is_asked_for_anew(panda, simulated, tmp_path):
     mover, orders = simulated(), Orders()
     procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP)

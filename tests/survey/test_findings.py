@@ -27,7 +27,7 @@ def row(arm, day, **more):
     plain |= {"log": f"{arm}/{day:02d}.csv", "arm": arm, "episode": None, "parts": 1, "date": 1.79e9 + DAY * day}
     plain |= {"status": "answered", "consistent": True, "mass": 1.0, "mass_low": 0.9, "mass_high": 1.1, "misfit": 10.0}
     plain |= {name: None for name in plain if name.startswith("slide_")}  # not asked
-    return plain | {"t1": 30.0, "determined": "m | mx", "held": True} | more
+    return plain | {"t1": 30.0, "determined": "m | m·rx | m·ry | m·rz | Ixx", "held": True} | more
 
 
 @pytest.fixture
@@ -71,6 +71,42 @@ def test_a_lasting_shift_of_friction_is_found_with_its_day_and_joint(rows):
     assert advised["mended"].retare
     assert not advised["sound"].retare
     assert shifts([one | {"date": None} for one in rows], 7) == {}
+
+
+def test_logs_in_which_the_arm_stood_or_that_were_broken_off_are_no_shift(rows):
+    """Their offsets and friction are near zero, as is expected of an arm of which nothing is seen."""
+    rng = np.random.default_rng(4)
+    rows = [row("worked", day) for day in range(12)]
+    for one in rows:
+        one |= {f"{name}_{j}": float(0.01 * rng.normal()) for name in ("offset", "coulomb") for j in range(1, 8)}
+        one["coulomb_7"] += 0.3
+    stood = [row("worked", day, determined=known) for day, known in ((12, "m | m·rx"), (13, ""), (14, "m | m·rz"))]
+    assert not shifts(rows, 7)["worked"].found
+    assert shifts([*rows, *stood], 7) == shifts(rows, 7)
+    (finding,) = arm_findings([*rows, *stood])
+    assert not finding.advice
+
+
+def test_of_an_arm_that_has_no_tare_nothing_is_said_about_its_tare(rows):
+    rows = [row("a", day, misfit=None, coulomb_2=0.4 * (day > 9) + 0.01 * (day % 3)) for day in range(20)]
+    (finding,) = arm_findings(rows)
+    assert "by the friction of joint 2 most, which shifted by +0.4 N·m: record it empty" in finding.advice
+    assert "at its tare" not in finding.advice
+
+
+def test_the_axes_of_dates_say_the_year_and_the_day(rows):
+    sections = survey_sections(rows, arm_findings(rows), 7)
+    over_time = sections[1].figures[0][0].axes[0].get_xlabel()
+    drift = [figure.get_supxlabel() for figure, _ in sections[2].figures]
+    assert {over_time, *drift} == {"date (UTC), 2026-09-21 to 2026-10-10"}
+    assert {figure.get_supylabel() for figure, _ in sections[2].figures} == {"torque [N·m]"}
+    one = [row("a", 0, date=1.79e9), row("a", 0, date=1.79e9 + 60.0)]
+    assert survey_sections(one, arm_findings(one), 7)[1].figures[0][0].axes[0].get_xlabel() == "date (UTC), 2026-09-21"
+
+
+def test_one_log_of_one_arm_is_no_plural():
+    one = [row("a", 0)]
+    assert survey_sections(one, arm_findings(one), 7)[0].text.startswith("1 log of 1 arm: 1 payload carried, 0 logs")
 
 
 def test_nothing_is_said_of_arms_that_could_not_be_asked(rows):

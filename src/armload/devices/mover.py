@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.devices.load import Load
 from armload.devices.source import Source
-from armload.devices.supervision import Supervision, Thresholds
+from armload.devices.supervision import SILENCE, Supervision, Thresholds
 from armload.errors import SafetyError, SinkError, SourceError
 from armload.motion import Course, Motion
 from armload.recording import Sample
@@ -34,6 +34,9 @@ AT_START = 0.005  # [rad] between where the arm is commanded to be and where a m
 _BLEND = 0.5  # [s] in which that is taken up
 _STOOD = 1.0  # [s] of samples whose times do not rise, after which their clock counts as one that stands
 SETTLE = 0.2  # [s] of samples after a movement's end, while the arm swings out
+_LOOK = 0.5  # [s] between two looks while no sample comes
+_LOST = 5.0  # [s] without a sample after which an arm on its way counts as lost, whatever its client waits for
+_USUAL = 3.0  # samples that may be missing of an arm that sends few
 
 
 class Mover(Source):
@@ -120,6 +123,9 @@ class StreamedMover(Mover):
             return None
         if movement.begun is None:
             movement.begun = begun()
+        passed, waited = movement.heard_at(sample.t)
+        if abs(passed) > max(SILENCE, _USUAL / self.rate):
+            self._missed(movement, passed, waited)
         t, course = sample.t - movement.begun, movement.course
         if course.braked is None:
             self._stop_for = self._stop_for or movement.supervision.problem(max(t, 0.0), sample, course)
@@ -128,6 +134,30 @@ class StreamedMover(Mover):
             self._movement = None
             return None
         return movement
+
+    def _missed(self, movement: _Movement, passed: float, waited: float) -> None:
+        """Stop: between two samples their clock went on by `passed` [s], more than it may, and ours by `waited` [s].
+
+        Commands are given by the samples' clock: the next one would be as far along the path.
+        """
+        if 0.0 < passed < 2.0 * waited:
+            why = f"no sample came for {passed:.2f} s"
+            self._silent(movement, passed)
+        else:
+            why = f"the clock of its samples jumped by {passed:+.2f} s"
+            self._jumped(movement, passed)
+        self.why = self._stop_for = self._stop_for or why
+
+    def _silent(self, movement: _Movement, passed: float) -> None:
+        """Go on after `passed` [s] without a sample: the arm stands at the last command, and stays there."""
+        assert movement.begun is not None
+        movement.begun += passed
+        movement.course.stand(movement.newest - movement.begun + 1.0 / self.rate)
+
+    def _jumped(self, movement: _Movement, passed: float) -> None:
+        """Go on where the arm is on its path, though the samples' clock jumped by `passed` [s]."""
+        assert movement.begun is not None
+        movement.begun += passed
 
     def _brakes(self, movement: _Movement, t: float) -> None:
         """Brake from t [s] on the movement's clock on, if that was asked for."""
@@ -140,7 +170,14 @@ class _Movement:
         self.course = Course(motion, arm.limits)
         self.supervision = Supervision(arm, motion, thresholds)
         self.begun: float | None = None
+        self.newest, self._seen = np.nan, np.nan  # the newest sample's time, and when that was seen
         self._away = away
+
+    def heard_at(self, t: float) -> tuple[float, float]:
+        """How far the samples' clock, now at t, and ours went on since the sample before [s]; 0 at the first one."""
+        before, seen = self.newest, self._seen
+        self.newest, self._seen = t, time.monotonic()
+        return (0.0, 0.0) if np.isnan(before) else (t - before, self._seen - seen)
 
     def target(self, t: float) -> NDArray[np.float64]:
         """The command q (n,) for t [s] on the movement's clock: without a jump from where the arm was held."""
@@ -178,11 +215,20 @@ def samples_of_movement(mover: Mover, motion: Motion, thresholds: Thresholds | N
 
     Raises:
         SafetyError: the movement must not begin.
-        SourceError: the connection was lost, the samples end on the way, or their clock stands still.
+        SourceError: the connection was lost, no more samples come, or their clock stands still.
     """
     mover.follow(motion, thresholds)
-    newest, risen = -np.inf, time.monotonic()
-    for sample in mover:
+    newest, heard = -np.inf, time.monotonic()
+    risen = heard
+    for sample in mover.ticking(_LOOK):
+        if sample is None:
+            if time.monotonic() - heard > _LOST:
+                raise SourceError(
+                    f"{mover.name} was lost: no sample for {_LOST:g} s while the arm was on its way; see that it is "
+                    "switched on and its cable is in, and open it again"
+                )
+            continue
+        heard = time.monotonic()
         yield sample
         if not mover.moving:
             return

@@ -85,7 +85,12 @@ class _Reader:
                 threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
                 about = {"name": source.name, "n": source.n, "rate": source.rate, "speed": source.speed}
                 self.report(event="ready", **about, notes=source.notes)
-                self.pass_on(source, recorder)
+                try:
+                    self.pass_on(source, recorder)
+                except (ArmloadError, OSError) as error:  # a client may try for long to close a link that is lost
+                    self.report(event="error", message=str(error), never=isinstance(error, _NEVER))
+                    os.close(self.wake)
+                    raise
             self.report(event="ended")
         except ModuleNotFoundError as error:
             if (sentence := missing(error)) is None:

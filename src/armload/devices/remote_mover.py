@@ -44,12 +44,15 @@ class RemoteMover(Source):
 
     def __init__(self, mover: Mover) -> None:
         self.mover, self.name, self.n, self.rate = mover, mover.name, mover.n, mover.rate
-        self.ended, self._begun = 0, 0
+        self.ended, self._begun, self._over = 0, 0, False
 
     def __iter__(self) -> Iterator[Sample]:
-        for sample in self.mover:
-            self.ended = self._begun - self.mover.moving
-            yield sample
+        try:
+            for sample in self.mover:
+                self.ended = self._begun - self.mover.moving
+                yield sample
+        finally:
+            self._over = True
 
     def begin(self, motion: dict[str, Any], thresholds: dict[str, Any]) -> int:
         """`Mover.follow`; the movement's number."""
@@ -74,10 +77,10 @@ class RemoteMover(Source):
         return self.mover.write(found, allow_undetermined_inertia=allow_undetermined_inertia)
 
     def come_to_rest(self) -> None:
-        """Stop, and wait until that is done."""
+        """Stop, and wait until that is done; nothing is done any more where the samples have ended."""
         self.mover.stop("whoever moved the arm has ended")
         until = time.monotonic() + TO_REST
-        while self.mover.moving and time.monotonic() < until:
+        while self.mover.moving and not self._over and time.monotonic() < until:
             time.sleep(_LOOK)
 
     def arrived(self) -> float | None:

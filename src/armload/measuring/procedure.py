@@ -66,7 +66,7 @@ class Procedure:
         mover: the arm, at rest.
         arm: which it is: bare, or with a tool that is known and mounted in both runs.
         motion: what is run, from rest to rest; empty_motion: what is run without the payload (None: the same).
-        folder: for the logs `empty.csv` and `loaded.csv`, which must not exist.
+        folder: for the logs `empty.csv` (unless there is a tare) and `loaded.csv`, which must not exist.
         basis: what is known of the arm and the payload; the movements are checked with its `heaviest`. None: nothing.
         room: see `plan_of`.
         accuracy: the loaded run ends when it is reached; None: with the motion.
@@ -98,7 +98,8 @@ class Procedure:
         self.folder, self.basis, self.room = Path(folder), basis or Basis(), room or Room()
         self._known = self.basis.known(arm)
         self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
-        for path in (self.folder / "empty.csv", self.folder / "loaded.csv"):
+        names = ("empty.csv", "loaded.csv") if self.basis.tare is None else ("loaded.csv",)
+        for path in (self.folder / name for name in names):
             if path.exists():
                 raise RecordingError(f"{path} exists: a log is never written over; name another folder")
         at = self._standing(_TO_SWING_OUT)
@@ -129,16 +130,16 @@ class Procedure:
         if tare is None:
             self._move(self.plan, TO_START)
             self._move(self.plan, EMPTY, empty)
-            self._move(self.plan, BACK)
-            mount()
-            tare = read_recording(empty, self.arm)
-        identifier = self._warm(tare)
         try:
-            plan = self._again(consent)
-            self._move(plan, TO_START)
-            seconds = self._move(plan, LOADED, loaded, identifier)
-        finally:
-            identifier.close()
+            if tare is None:
+                self._move(self.plan, BACK)
+                mount()
+                tare = read_recording(empty, self.arm)
+            seconds = self._loaded_run(tare, loaded, consent)
+        except BaseException:  # also Ctrl-C
+            if self.basis.tare is None:
+                self._say(f"the empty run is whole: once the payload is on, --tare {empty} goes on from there")
+            raise
         self._say("identifying")
         about = self.basis
         known = {"mass": about.mass, "com": about.com, "body": about.body, "family": about.family}
@@ -149,6 +150,16 @@ class Procedure:
             half_width = Z95 * np.sqrt(np.maximum(np.diag(answer.covariance), 0.0))
             reached = self.accuracy.holds(half_width)
         return Measurement(answer, empty if about.tare is None else None, loaded, seconds, reached)
+
+    def _loaded_run(self, tare: Recording, log: Path, consent: Callable[[Plan], bool]) -> float:
+        """Move with the payload, from wherever the arm is now; how long that took [s]."""
+        identifier = self._warm(tare)
+        try:
+            plan = self._again(consent)
+            self._move(plan, TO_START)
+            return self._move(plan, LOADED, log, identifier)
+        finally:
+            identifier.close()
 
     def _plan(self, at: NDArray[np.float64], empty_run: bool) -> Plan:
         more = {"empty_motion": self.empty_motion, "room": self.room, "heaviest": self.basis.heaviest}
@@ -250,6 +261,11 @@ class Procedure:
             )
         if self.mover.why not in (None, ENOUGH):
             raise SafetyError(f"the arm was stopped on its way {purpose}: {self.mover.why}; {_kept(log)}")
+        if recorder is not None and len(recorder.paths) > 1:
+            raise RecordingError(
+                f"the clock of {self.mover.name} went back on the way {purpose}, and the log is in parts "
+                f"({', '.join(map(str, recorder.paths))}): see what sets that clock, and measure into another folder"
+            )
         return last - first
 
     def _enough(self, identifier: OnlineIdentifier, sample: Sample, look: bool) -> bool:

@@ -45,12 +45,13 @@ class Course(Motion):
 
     Attributes:
         motion: as given.
-        braked: when braking began [s]; None: it did not.
+        braked: when braking began, or the arm stood [s]; None: it did not.
     """
 
     def __init__(self, motion: Motion, limits: Limits) -> None:
         self.motion, self.name = motion, motion.name
         self.braked: float | None = None
+        self._stood: float | None = None
         self._lasting = 0.0
         self._starts, self._times = _braking_times(motion, filled_limits(limits))
 
@@ -62,6 +63,8 @@ class Course(Motion):
     @property
     def duration(self) -> float:
         """When the arm is at rest for good [s]."""
+        if self._stood is not None:
+            return self._stood
         return self.motion.duration if self.braked is None else min(self.motion.duration, self.braked) + self._lasting
 
     def braking_time(self, t: float) -> float:
@@ -75,6 +78,11 @@ class Course(Motion):
             self._lasting = self.braking_time(t)
             self.braked = float(t)
         return self.duration
+
+    def stand(self, t: float) -> None:
+        """Stay where it is at the instant t, without a way to rest: for an arm that stands there already."""
+        self._stood = min(float(t), self.duration)
+        self.braked = self._stood if self.braked is None else self.braked
 
     def progress(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """The motion's own time s at times t (N,) [s]."""
@@ -99,6 +107,12 @@ class Course(Motion):
 
     def _clock(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         """s and its first three derivatives at times t (N,)."""
+        if self._stood is None:
+            return self._under_way(t)
+        s, *rates = self._under_way(np.minimum(t, self._stood))
+        return s, *(np.where(t <= self._stood, rate, 0.0) for rate in rates)
+
+    def _under_way(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         if self.braked is None or self._lasting == 0.0:
             return np.minimum(t, self.motion.duration), np.ones_like(t), np.zeros_like(t), np.zeros_like(t)
         T, start = self._lasting, self.braked

@@ -15,7 +15,7 @@ from armload.identification import identify
 from armload.runtime.version import __version__
 from armload.survey.content import NO_FILE, is_special
 from armload.survey.logs import Log
-from armload.survey.rows import UNUSABLE, answered, unusable
+from armload.survey.rows import SEPARATOR, UNUSABLE, answered, unusable
 from armload.survey.settings import Settings
 from armload.survey.sliding import slides_of_parts
 from armload.survey.stores import filesystem
@@ -114,7 +114,7 @@ def _of_one(log: Log, settings: Settings, path: Path, about: dict[str, Any]) -> 
     known = (None, None) if found.another else (tare, profile)
     rows, lacking = answered(found, about, slides_of_parts(found, recording, arm, *known)), settings.lacking(log.arm)
     for row in rows:
-        row["notes"] = " | ".join([*lacking, row["notes"]]) if lacking else row["notes"]
+        row["notes"] = SEPARATOR.join(filter(None, [*lacking, row["notes"]]))
     return rows
 
 

@@ -61,9 +61,14 @@ class ArmFinding:
         """What to do about the arm; "" where nothing is."""
         advice = []
         if self.retare:
+            if self.shift is not None and self.shift.found and (self.changed or 0.0) < SHARE_CHANGED:
+                shifted = f"which shifted by {self.shift.size:+.2g} N·m"
+                how = f", by the {self.shift.what} of joint {self.joint} most, {shifted}"
+            else:
+                how = f" at its tare or in its profile, at joint {self.joint} most"
             advice.append(
-                f"is not as it was at its tare or in its profile, at joint {self.joint} most: record it empty, and "
-                "tare it or learn its profile anew; if it was exchanged, learn the new one from its own logs alone"
+                f"is not as it was{how}: record it empty, and tare it or learn its profile anew; if it was exchanged, "
+                "learn the new one from its own logs alone"
             )
         if self.loose:
             far = f" by {1e3 * self.slide.gap:.0f} mm either way" if self.slide is not None and self.slide.found else ""

@@ -14,7 +14,7 @@ from armload.lab.report.shown import Table
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.survey.findings import LAST, SHARE_CHANGED, SHARE_MOVES, ArmFinding, arm_findings, by_log, doubtful
 from armload.survey.looseness import LOOSE
-from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE
+from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE, shows_the_arm
 from armload.survey.shift import SHIFTED
 from armload.survey.table_file import read_rows
 
@@ -25,6 +25,9 @@ _MOST_ROWS = 60  # of the table of doubtful logs: the survey itself has them all
 _MOST_ARMS = 24  # that are drawn each in a panel, those with something to do first
 _MOST_DRAWN = 500  # points that are drawn as lines, each: a page of thousands would be slow
 _LONGEST = 220  # characters of a reason in a table
+# of dates, whose axis tells years, months, days, hours, minutes or seconds
+_FORMS = ("%Y", "%Y-%m", "%m-%d", "%H:%M", "%H:%M", "%H:%M:%S")
+_ROUND = ("%Y", "%Y-%m", "%m-%d", "%m-%d", "%H:%M", "%H:%M")  # the first of a year, of a month, …; midnight is a day
 _TAIL = 0.01  # share of the dots on either side that may lie beyond a panel: one odd log must not flatten all others
 
 
@@ -39,7 +42,7 @@ def write_survey_report(table: str | Path, out: str | Path) -> list[str]:
     """
     rows, n = read_rows(table)
     findings = arm_findings(rows)
-    write_report(out, survey_sections(rows, findings, n), f"Survey of {len(findings)} arms")
+    write_report(out, survey_sections(rows, findings, n), f"Survey of {_counted(len(findings), 'arm')}")
     return [finding.advice for finding in findings if finding.advice]
 
 
@@ -57,10 +60,11 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
     logs = {(row["log"], row["episode"]) for row in rows}
     held = [row for row in rows if row["status"] == ANSWERED and row["held"]]
     lost = sum(row["status"] == UNUSABLE for row in rows)
-    advice = [f"**{_since(f)}** {f.advice}." for f in findings if f.advice] or ["No arm asks for anything."]
+    advice = [f"**Since {_since(f)}:** {f.advice}." for f in findings if f.advice] or ["No arm asks for anything."]
     asked = any(f.changed is not None for f in findings)
     text = [
-        f"{len(logs)} logs of {len(findings)} arms: {len(held)} payloads were carried, {lost} logs cannot be answered.",
+        f"{_counted(len(logs), 'log')} of {_counted(len(findings), 'arm')}: {_counted(len(held), 'payload')} carried, "
+        f"{_counted(lost, 'log')} not answered.",
         *advice,
         ""
         if asked
@@ -121,7 +125,7 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
             }
             ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], label=finding.arm, alpha=0.75, **style)
             _dated(ax, x, 9)
-        ax.set_xlabel(_time_label(dated))
+        ax.set_xlabel(_time_label(held, dated))
         ax.set_ylabel("mass [kg]")
         if len(findings) <= 30:
             over_time.legend(*ax.get_legend_handles_labels(), loc="outside right upper", fontsize=8)
@@ -145,14 +149,15 @@ def _arms(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int
     """Offsets and friction, a panel for each arm, over time."""
     shown = sorted(findings, key=lambda f: not f.advice)[:_MOST_ARMS]
     figures = []
-    for name, what in (("offset", "torque offset"), ("coulomb", "Coulomb friction")):
-        figures.append((_drift(rows, shown, n, name), f"{what} of each joint [N·m], beside the model or its tare's."))
+    for name, what in (("offset", "Torque offset"), ("coulomb", "Coulomb friction")):
+        beyond = "beyond that of its tare or profile, or of its model where there is none"
+        figures.append((_drift(rows, shown, n, name), f"{what} of each joint, {beyond}."))
     more = len(findings) > _MOST_ARMS
     left = f" The first {_MOST_ARMS} of {len(findings)} arms, those that ask for something first." if more else ""
     scale = (
         "Arms that ask to be tared anew have a scale of their own, the others share one; a log far off may lie beyond."
     )
-    return Section("Drift of the arms", f"A dot is a log. {scale}{left}", figures=tuple(figures))
+    return Section("Drift of the arms", f"A dot is a log in which the arm moved. {scale}{left}", figures=tuple(figures))
 
 
 def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, name: str) -> Figure:
@@ -165,7 +170,7 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
         for ax, finding in zip(panels, shown, strict=False):
             logs = [
                 of
-                for of in by_log([row for row in rows if row["arm"] == finding.arm])
+                for of in by_log([row for row in rows if row["arm"] == finding.arm and shows_the_arm(row)])
                 if of[0][f"{name}_1"] is not None
             ]
             x, drawn = _days([of[0] for of in logs], dated), []
@@ -183,7 +188,8 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
         _limit(alike)
         for ax in panels[len(shown) :]:
             ax.set_visible(False)
-        figure.supxlabel(_time_label(dated), fontsize=9)
+        figure.supxlabel(_time_label(rows, dated), fontsize=9)
+        figure.supylabel("torque [N·m]", fontsize=9)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=n, markerscale=2)
     return figure
 
@@ -269,7 +275,9 @@ def _dated(ax: Any, x: np.ndarray, most: int) -> None:
 
         # asked for three ticks of two to three days it would have to take hours, too many for a panel, and warns of it
         ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=2, maxticks=most))
-        ax.xaxis.set_major_formatter(ConciseDateFormatter(locator, show_offset=False))
+        ax.xaxis.set_major_formatter(
+            ConciseDateFormatter(locator, formats=_FORMS, zero_formats=_ROUND, show_offset=False)
+        )
     else:
         _whole(ax.xaxis, most)
 
@@ -281,8 +289,17 @@ def _whole(axis: Any, most: int = 9) -> None:
     axis.set_major_locator(MaxNLocator(most, integer=True))
 
 
-def _time_label(dated: bool) -> str:
-    return "date" if dated else "logs in order: not all of them say when they were recorded"
+def _time_label(rows: Sequence[dict[str, Any]], dated: bool) -> str:
+    """What an axis of time says of itself: ticks have room for neither the year nor, within a day, the day."""
+    if not dated:
+        return "logs in order: not all of them say when they were recorded"
+    days = [datetime.fromtimestamp(row["date"], UTC).strftime("%Y-%m-%d") for row in rows if row["status"] == ANSWERED]
+    first, last = min(days), max(days)
+    return f"date (UTC), {first}" if first == last else f"date (UTC), {first} to {last}"
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _since(finding: ArmFinding) -> str:
@@ -290,7 +307,7 @@ def _since(finding: ArmFinding) -> str:
         return ""
     if isinstance(finding.since, str):
         return finding.since
-    return datetime.fromtimestamp(finding.since, UTC).strftime("%Y-%m-%d %H:%M")
+    return datetime.fromtimestamp(finding.since, UTC).strftime("%Y-%m-%d %H:%M UTC")
 
 
 def _share(value: float | None, act: bool) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,6 +53,15 @@ def columns(n: int) -> dict[str, str]:
         **dict.fromkeys((*of_joints(n), *of_ways), NUMBER),
         **dict.fromkeys(("version", "key"), TEXT),
     }
+
+
+def shows_the_arm(row: Mapping[str, Any]) -> bool:
+    """Whether the arm moved so much that the row tells of its own torque: mass and first moments are determined.
+
+    Of an arm that stands, or of a log that was broken off at once, offsets and friction are what was expected of them,
+    near zero, and not what they are.
+    """
+    return row["status"] == ANSWERED and set(NAMES[:4]) <= set(row["determined"].split(SEPARATOR))
 
 
 def answered(found: Identification, where: dict[str, Any], slides: Sequence[Slide | None] = ()) -> list[dict[str, Any]]:

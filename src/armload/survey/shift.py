@@ -1,6 +1,7 @@
 """Whether an arm became another one: a lasting shift of its offsets or friction, against how they differ by the day.
 
-Each channel (a joint's offset or friction) has one value a day, the median of the day's rows. With s its spread from
+Each channel (a joint's offset or friction) has one value a day, the median of the day's rows in which the arm moved
+enough to tell (`shows_the_arm`). With s its spread from
 one day to the next, pooled over all arms (sound arms are most of a fleet), and n, m days before and after a split,
 
     z = |mean after − mean before| / (s·√(1/n + 1/m))
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.identification.tare_age import DAY
-from armload.survey.rows import of_joints
+from armload.survey.rows import of_joints, shows_the_arm
 
 # days on either side of a split, at least: fewer may be one odd day
 FEWEST = 2
@@ -51,7 +52,9 @@ class Shift:
 
 
 def shifts(rows: Sequence[Mapping[str, Any]], n: int) -> dict[str, Shift]:
-    """The most likely shift of each arm that was seen on enough days; rows without a date say nothing.
+    """The most likely shift of each arm that was seen on enough days.
+
+    Rows without a date, or of an arm that hardly moved, say nothing.
 
     Args:
         rows: answered, of arms with n joints.
@@ -72,7 +75,7 @@ def _by_day(rows: Sequence[Mapping[str, Any]], n: int) -> tuple[NDArray[np.float
     names = of_joints(n)
     of: dict[int, list[tuple[float, list[float]]]] = {}
     for row in rows:
-        if row["date"] is not None and row[names[0]] is not None:
+        if row["date"] is not None and row[names[0]] is not None and shows_the_arm(row):
             of.setdefault(int(row["date"] // DAY), []).append((row["date"], [row[name] for name in names]))
     days = [of[day] for day in sorted(of)]
     when = np.array([min(date for date, _ in day) for day in days])

@@ -74,9 +74,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     if "--traceback" in arguments:
         arguments.remove("--traceback")
         show_traceback = True
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the parent process: the output is dropped
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+    # closed by the parent process: there is no input, and output is dropped. In this order each takes its own
+    # descriptor, and no pipe to another process gets one of them
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if not hasattr(stream, "reconfigure"):
             continue

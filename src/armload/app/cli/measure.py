@@ -24,6 +24,7 @@ from armload.app.cli.named import (
 )
 from armload.app.cli.printing import print_json, print_note, working, write_json
 from armload.errors import MotionError, SafetyError, SinkError, UsageError
+from armload.runtime.interruption import ended_by_sigterm
 
 __all__ = ["parser", "run"]
 
@@ -89,7 +90,8 @@ def run(options: argparse.Namespace) -> int | None:
             procedure.plan.check()
             print_json(procedure.plan.to_dict()) if options.json else print(procedure.plan)
             return None
-        found = procedure.run(_consent(options), _mount(options, mover))
+        with ended_by_sigterm():
+            found = procedure.run(_consent(options), _mount(options, mover))
         for note in found.answer.notes:
             print_note(note)
         if options.out is not None:
@@ -174,8 +176,19 @@ def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
 def _typed_yes(question: str) -> bool:
     if not sys.stdin.isatty():
         raise SafetyError("nothing was moved: nobody is at a terminal to agree; look at --dry-run, then give --move")
+    return _typed(question).strip() == "yes"
+
+
+def _typed(question: str) -> str:
+    """The line that is typed; "" at the end of standard input. What is printed next has a line of its own."""
     print(question, end="", file=sys.stderr, flush=True)
-    return sys.stdin.readline().strip() == "yes"
+    line = ""
+    try:
+        line = sys.stdin.readline()
+    finally:
+        if not line.endswith("\n"):
+            print(file=sys.stderr, flush=True)
+    return line
 
 
 def _mount(options: argparse.Namespace, mover: Mover) -> Callable[[], None]:
@@ -186,17 +199,12 @@ def _mount(options: argparse.Namespace, mover: Mover) -> Callable[[], None]:
             code = subprocess.run(options.grip, stdout=sys.stderr, check=False).returncode
             if code:
                 raise SafetyError(
-                    f"{grip} ended with exit code {code}: the payload may not be on; mount it, and go on with "
-                    "the log of the empty run as --tare"
+                    f"{grip} ended with exit code {code}: the payload may not be on; mount it, and measure again"
                 )
-        elif not mover.mount():
-            print("mount the payload, step back, and press Enter: the arm then moves: ", end="", file=sys.stderr)
-            sys.stderr.flush()
-            if not sys.stdin.readline():
-                raise SafetyError(
-                    "nobody says that the payload is on: give --grip COMMAND, or its log with --tare; the empty run is "
-                    "recorded"
-                )
+        elif not mover.mount() and not _typed("mount the payload, step back, and press Enter: the arm then moves: "):
+            raise SafetyError(
+                "nobody says that the payload is on: press Enter once it is, or give --grip COMMAND that mounts it"
+            )
 
     return mount
 

@@ -113,7 +113,8 @@ class URMover(StreamedMover):
             self._source.close()
 
     def _servo(self, q: NDArray[np.float64]) -> None:
-        assert self._control is not None
+        if self._control is None:  # it was let go of on its way, by `close`
+            raise SourceError(f"{self.name} was closed while the arm was on its way")
         if not self._control.servoJ(q.tolist(), 0.0, 0.0, _CYCLE, _LOOKAHEAD, _GAIN):
             raise SourceError(f"{self.name} takes no more targets: its program has stopped; look at its pendant")
 
