@@ -1,8 +1,8 @@
 """Whether an arm became another one: a lasting shift of its offsets or friction, against how they differ by the day.
 
 Each channel (a joint's offset or friction) has one value a day, the median of the day's rows in which the arm moved
-enough to tell (`shows_the_arm`). With s its spread from
-one day to the next, pooled over all arms (sound arms are most of a fleet), and n, m days before and after a split,
+enough to tell (`shows_the_arm`). With s its spread from one day to the next, pooled over all arms (sound arms are most
+of a fleet), and n, m days before and after a split,
 
     z = |mean after − mean before| / (s·√(1/n + 1/m))
 
