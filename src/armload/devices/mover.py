@@ -95,7 +95,7 @@ class StreamedMover(Mover):
 
     def __init__(self, arm: Arm) -> None:
         self.arm, self.n = arm, arm.n
-        self._movement: _Movement | None = None
+        self._movement: Movement | None = None
         self._stop_for: str | None = None
 
     @property
@@ -107,13 +107,13 @@ class StreamedMover(Mover):
         """Begin a movement with the next command."""
         away = check_start(self, motion)
         self.why = self._stop_for = None
-        self._movement = _Movement(self.arm, motion, thresholds or Thresholds(), away)
+        self._movement = Movement(self.arm, motion, thresholds or Thresholds(), away)
 
     def stop(self, why: str) -> None:
         """Brake with the next command."""
         self._stop_for = self._stop_for or why
 
-    def _took(self, sample: Sample, begun: Callable[[], float]) -> _Movement | None:
+    def _took(self, sample: Sample, begun: Callable[[], float]) -> Movement | None:
         """Look at a sample; the movement it belongs to, braked if it must be; None at rest.
 
         begun: called when a movement begins: the time on the samples' clock at which its first command takes effect.
@@ -135,7 +135,7 @@ class StreamedMover(Mover):
             return None
         return movement
 
-    def _missed(self, movement: _Movement, passed: float, waited: float) -> None:
+    def _missed(self, movement: Movement, passed: float, waited: float) -> None:
         """Stop: between two samples their clock went on by `passed` [s], more than it may, and ours by `waited` [s].
 
         Commands are given by the samples' clock: the next one would be as far along the path.
@@ -148,24 +148,26 @@ class StreamedMover(Mover):
             self._jumped(movement, passed)
         self.why = self._stop_for = self._stop_for or why
 
-    def _silent(self, movement: _Movement, passed: float) -> None:
+    def _silent(self, movement: Movement, passed: float) -> None:
         """Go on after `passed` [s] without a sample: the arm stands at the last command, and stays there."""
         assert movement.begun is not None
         movement.begun += passed
         movement.course.stand(movement.newest - movement.begun + 1.0 / self.rate)
 
-    def _jumped(self, movement: _Movement, passed: float) -> None:
+    def _jumped(self, movement: Movement, passed: float) -> None:
         """Go on where the arm is on its path, though the samples' clock jumped by `passed` [s]."""
         assert movement.begun is not None
         movement.begun += passed
 
-    def _brakes(self, movement: _Movement, t: float) -> None:
+    def _brakes(self, movement: Movement, t: float) -> None:
         """Brake from t [s] on the movement's clock on, if that was asked for."""
         if self._stop_for is not None and movement.course.braked is None and t < movement.course.duration:
             movement.course.brake(max(t, 0.0))
 
 
-class _Movement:
+class Movement:
+    """What a streamed mover knows of the movement that it is on."""
+
     def __init__(self, arm: Arm, motion: Motion, thresholds: Thresholds, away: NDArray[np.float64]) -> None:
         self.course = Course(motion, arm.limits)
         self.supervision = Supervision(arm, motion, thresholds)

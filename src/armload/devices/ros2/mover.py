@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.devices.mover import StreamedMover, _Movement
+from armload.devices.mover import Movement, StreamedMover
 from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.source import Ros2Source
 from armload.devices.supervision import Thresholds
@@ -105,13 +105,13 @@ class Ros2Mover(StreamedMover):
         """Leave the network; an arm on its way comes to rest."""
         self._source.close()
 
-    def _silent(self, movement: _Movement, passed: float) -> None:  # noqa: ARG002
+    def _silent(self, movement: Movement, passed: float) -> None:  # noqa: ARG002
         """Brake where the newest trajectory does, at the latest: the controller has followed it meanwhile."""
         assert movement.begun is not None
         now = movement.newest - movement.begun + self._source.lag()
         movement.course.brake(min(max(now, 0.0) + _LEAD, max(self._sent, 0.0) + _AHEAD))
 
-    def _jumped(self, movement: _Movement, passed: float) -> None:
+    def _jumped(self, movement: Movement, passed: float) -> None:
         """The controller's clock is the samples': stamps go with it."""
         super()._jumped(movement, passed)
         self._start += round(1e9 * passed)
