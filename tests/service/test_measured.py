@@ -29,3 +29,5 @@ def test_memory_and_processor_time_are_the_committed_results():
     assert f"{slope:+.1f} ± {half:.1f} MB an hour" in PAGE
     assert f"{100 * changing['share of a core']:.1f} % of a core where the payload changes" in PAGE
     assert f"{100 * steady['share of a core']:.1f} % where it stays the same" in PAGE
+    assert f"takes {steady['state, mean [MB]']:.0f} MB while the payload stays the same" in PAGE
+    assert f"{changing['state, mean [MB]']:.0f} MB in the mean where it changes every 15 s" in PAGE
