@@ -17,6 +17,7 @@ from armload.survey.looseness import LOOSE
 from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE, shows_the_arm
 from armload.survey.shift import SHIFTED
 from armload.survey.table_file import read_rows
+from armload.survey.time_axis import are_dated, mark, time_label, times_of, whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,9 +26,6 @@ _MOST_ROWS = 60  # of the table of doubtful logs: the survey itself has them all
 _MOST_ARMS = 24  # that are drawn each in a panel, those with something to do first
 _MOST_DRAWN = 500  # points that are drawn as lines, each: a page of thousands would be slow
 _LONGEST = 220  # characters of a reason in a table
-# of dates, whose axis tells years, months, days, hours, minutes or seconds
-_FORMS = ("%Y", "%Y-%m", "%m-%d", "%H:%M", "%H:%M", "%H:%M:%S")
-_ROUND = ("%Y", "%Y-%m", "%m-%d", "%m-%d", "%H:%M", "%H:%M")  # the first of a year, of a month, …; midnight is a day
 _TAIL = 0.01  # share of the dots on either side that may lie beyond a panel: one odd log must not flatten all others
 
 
@@ -109,13 +107,13 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
     held = [row for row in rows if row["status"] == ANSWERED and row["held"]]
     if not held:
         return Section("Payloads", "Nothing was held in any log.")
-    dated = _are_dated(held)
+    dated = are_dated(held)
     with look():
         over_time = new_figure(4.2)
         ax = over_time.subplots()
         for k, finding in enumerate(findings):
             of = [row for row in held if row["arm"] == finding.arm]
-            x, mass = _days(of, dated), np.array([row["mass"] for row in of])
+            x, mass = times_of(of, dated), np.array([row["mass"] for row in of])
             half = np.abs(np.array([[row["mass_low"], row["mass_high"]] for row in of]).reshape(-1, 2).T - mass)
             style: dict[str, Any] = {
                 "rasterized": len(held) > _MOST_DRAWN,
@@ -124,8 +122,8 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
                 "elinewidth": 0.7,
             }
             ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], label=finding.arm, alpha=0.75, **style)
-            _dated(ax, x, 9)
-        ax.set_xlabel(_time_label(held, dated))
+            mark(ax, x, 9)
+        ax.set_xlabel(time_label(held, dated))
         ax.set_ylabel("mass [kg]")
         if len(findings) <= 30:
             over_time.legend(*ax.get_legend_handles_labels(), loc="outside right upper", fontsize=8)
@@ -134,7 +132,7 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
         ax.hist([row["mass"] for row in held], bins="auto", color=COLOURS[0], edgecolor="white")
         ax.set_xlabel("mass [kg]")
         ax.set_ylabel("payloads")
-        _whole(ax.yaxis)
+        whole(ax.yaxis)
     return Section(
         "Payloads",
         "",
@@ -161,7 +159,7 @@ def _arms(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int
 
 
 def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, name: str) -> Figure:
-    across, dated = min(4, len(shown)), _are_dated(rows)
+    across, dated = min(4, len(shown)), are_dated(rows)
     down = -(-len(shown) // across)
     with look():
         figure = new_figure(0.7 + 1.5 * down)
@@ -173,7 +171,7 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
                 for of in by_log([row for row in rows if row["arm"] == finding.arm and shows_the_arm(row)])
                 if of[0][f"{name}_1"] is not None
             ]
-            x, drawn = _days([of[0] for of in logs], dated), []
+            x, drawn = times_of([of[0] for of in logs], dated), []
             for j in range(n):
                 y = [float(np.mean([row[f"{name}_{j + 1}"] for row in of])) for of in logs]
                 ax.plot(x, y, ".", markersize=3, color=COLOURS[j % len(COLOURS)], label=f"joint {j + 1}")
@@ -182,13 +180,13 @@ def _drift(rows: Sequence[dict[str, Any]], shown: Sequence[ArmFinding], n: int, 
                 _limit([(ax, drawn)])
             else:
                 alike.append((ax, drawn))
-            _dated(ax, x, 6)
+            mark(ax, x, 6)
             ax.tick_params(labelsize=7)
             ax.set_title(finding.arm + (" !" if finding.advice else ""), loc="left", fontsize=8.5)
         _limit(alike)
         for ax in panels[len(shown) :]:
             ax.set_visible(False)
-        figure.supxlabel(_time_label(rows, dated), fontsize=9)
+        figure.supxlabel(time_label(rows, dated), fontsize=9)
         figure.supylabel("torque [N·m]", fontsize=9)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=n, markerscale=2)
     return figure
@@ -254,48 +252,6 @@ def _folder(logs: Sequence[str]) -> str:
     while not all(log.startswith(common) for log in logs):
         common = common[:-1]
     return common[: common.rfind("/") + 1]
-
-
-def _are_dated(rows: Sequence[dict[str, Any]]) -> bool:
-    """Whether all answered logs say when they were recorded: one axis cannot show days and the order of logs."""
-    return all(row["date"] is not None for row in rows if row["status"] == ANSWERED)
-
-
-def _days(rows: Sequence[dict[str, Any]], dated: bool) -> np.ndarray:
-    """When rows were recorded, to the millisecond, or their number where logs are not all dated."""
-    if not dated:
-        return np.arange(1.0, len(rows) + 1.0)
-    return np.array([int(1e3 * row["date"]) for row in rows], dtype="datetime64[ms]")
-
-
-def _dated(ax: Any, x: np.ndarray, most: int) -> None:
-    """Few dates on an axis, and short ones; of logs without dates, whole numbers."""
-    if x.dtype.kind == "M":
-        from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
-
-        # asked for three ticks of two to three days it would have to take hours, too many for a panel, and warns of it
-        ax.xaxis.set_major_locator(locator := AutoDateLocator(minticks=2, maxticks=most))
-        ax.xaxis.set_major_formatter(
-            ConciseDateFormatter(locator, formats=_FORMS, zero_formats=_ROUND, show_offset=False)
-        )
-    else:
-        _whole(ax.xaxis, most)
-
-
-def _whole(axis: Any, most: int = 9) -> None:
-    """Ticks at whole numbers: there is no half of a log, nor of a payload."""
-    from matplotlib.ticker import MaxNLocator
-
-    axis.set_major_locator(MaxNLocator(most, integer=True))
-
-
-def _time_label(rows: Sequence[dict[str, Any]], dated: bool) -> str:
-    """What an axis of time says of itself: ticks have room for neither the year nor, within a day, the day."""
-    if not dated:
-        return "logs in order: not all of them say when they were recorded"
-    days = [datetime.fromtimestamp(row["date"], UTC).strftime("%Y-%m-%d") for row in rows if row["status"] == ANSWERED]
-    first, last = min(days), max(days)
-    return f"date (UTC), {first}" if first == last else f"date (UTC), {first} to {last}"
 
 
 def _counted(number: int, what: str) -> str:
