@@ -46,12 +46,13 @@ def held(mass: float, std: float, determined: bool) -> bool:
 def held_probability(mass: float, std: float, payloads: float) -> float:
     """Probability that anything is there, if that is as likely beforehand as that nothing is.
 
-    What is there has a mass of N(0, payloads²), so that with σ² = std² and s² = payloads² the odds are
-    N(mass; 0, σ² + s²) to N(mass; 0, σ²); a mass below zero is nothing.
+    What is there has a mass above zero, |x| of x ~ N(0, s²), so that with σ² = std², s² = payloads² and v² = σ² + s²
+    the odds are 2·N(mass; 0, v²)·Φ(mass·s/(σ·v)) to N(mass; 0, σ²). A mass below zero says no more than zero does.
 
     Args:
         mass: the estimate [kg]. std: its standard deviation [kg]. payloads: how heavy payloads are beforehand [kg].
     """
-    noise, all_of_it = std * std, std * std + payloads * payloads
-    room = 0.5 * math.log(noise / all_of_it) + 0.5 * max(mass, 0.0) ** 2 * (1.0 / noise - 1.0 / all_of_it)
+    mass, all_of_it = max(mass, 0.0), math.hypot(std, payloads)
+    room = math.log(std / all_of_it) + 0.5 * mass**2 * (std**-2 - all_of_it**-2)
+    room += math.log(math.erfc(-mass * payloads / (math.sqrt(2.0) * std * all_of_it)))  # 2·Φ(x) = erfc(−x/√2)
     return 1.0 / (1.0 + math.exp(-min(max(room, -700.0), 700.0)))
