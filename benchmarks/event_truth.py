@@ -22,12 +22,13 @@ from numpy.typing import NDArray
 
 BINS = np.array([0.0, 0.02, 0.1, 0.3, 0.7, 0.9, 0.98, 1.0])
 FELT = np.array([0.02, *(3 * [0.002])])  # [kg], [kg·m] what is as large is another payload
+LEAST = 0.01  # [kg] less is nothing
 AS_BEFORE, TAKEN_UP = 1, 2  # what a "return" is: the run before the event goes on, that before the last is taken up
-T, SETTLING, RETURN, HELD, CHANGE, CONTACT, SINCE = 0, 5, 6, 7, 8, 9, 10  # columns of what a stream said
+T, SETTLING, RETURN, HELD, CHANGE, CONTACT, SINCE, IS_HELD = 0, 5, 6, 7, 8, 9, 10, 11  # columns of what a stream said
 
 
 def began_with(said: NDArray, held: NDArray) -> NDArray[np.float64]:
-    """What the run at work began with (N, 10), of what a stream said (N, 11) and what was held (N, 10) then."""
+    """What the run at work began with (N, 10), of what a stream said (N, 12) and what was held (N, 10) then."""
     out, noticed = np.empty_like(held), False  # whether an event is settling
     earlier, previous, current = None, None, held[0]
     for k, now in enumerate(said):
@@ -48,7 +49,7 @@ def reliability_of(stream: Stream, said: NDArray, held: NDArray, every: NDArray)
     """Of the moments `every` of a stream: how often its probabilities were right.
 
     Args:
-        said: (N, 11) what the stream said, columns as above. held: (N, 10) what was held then. every: their numbers.
+        said: (N, 12) what the stream said, columns as above. held: (N, 10) what was held then. every: their numbers.
     """
     t = said[:, T]
     changed = (np.abs(held - began_with(said, held))[:, :4] > FELT).any(axis=1)
@@ -64,7 +65,7 @@ def reliability_of(stream: Stream, said: NDArray, held: NDArray, every: NDArray)
         "p_contact": counted(said[every, CONTACT][~edge[every]], pushed[every][~edge[every]]),
     }
     if stream.base is not None:
-        out["p_held"] = counted(said[every, HELD], held[every, 0] + stream.base > 0.01)
+        out["p_held"] = counted(said[every, HELD], held[every, 0] + stream.base > LEAST)
     return out
 
 
@@ -72,3 +73,13 @@ def counted(p: NDArray, true: NDArray) -> list[tuple[int, float, int]]:
     """Of each bin of probabilities: how many moments, their sum, and how often it was so."""
     which = np.clip(np.searchsorted(BINS, p, side="right") - 1, 0, len(BINS) - 2)
     return [(int((x := which == k).sum()), float(p[x].sum()), int(true[x].sum())) for k in range(len(BINS) - 1)]
+
+
+def turns_of_held(turns: int, said: NDArray, true: NDArray, every: NDArray) -> dict[str, int]:
+    """How often `held` turned, and should have; in how many of the moments `every` it was wrong.
+
+    Args:
+        turns: how often it turned. said, true: (N,) what it was, and should have been. every: their numbers.
+    """
+    should = int(true[0]) + int(np.count_nonzero(true[1:] != true[:-1]))
+    return {"turned": turns, "should": should, "wrong": int((said != true)[every].sum()), "moments": len(every)}

@@ -50,7 +50,7 @@ from typing import Any
 
 import numpy as np
 from event_scenes import LOOKED, PARTS, RATES, Scene, Stream, streamed
-from event_truth import AS_BEFORE, TAKEN_UP, reliability_of
+from event_truth import AS_BEFORE, IS_HELD, LEAST, TAKEN_UP, reliability_of, turns_of_held
 from scipy.stats import beta, chi2
 from script import ROOT, markdown_table, options, say, write, write_table
 from threadpoolctl import threadpool_limits
@@ -101,9 +101,10 @@ def measured(scene: Scene) -> dict[str, Any]:
 
 def measured_stream(stream: Stream) -> dict[str, Any]:
     """What the default method says of a stream, as a cell's numbers."""
-    identifier, said, events, last = OnlineIdentifier(stream.robot, stream.tare), [], {}, -np.inf
+    identifier, said, events, last, turns, was = OnlineIdentifier(stream.robot, stream.tare), [], {}, -np.inf, 0, False
     for sample in stream.log:
         one = identifier.update(*sample)
+        turns, was = turns + (one.held != was), one.held
         if one.event is not None:
             events[one.event.t] = one.event.to_dict()
         if one.t - last < 0.999 * LOOK:
@@ -115,7 +116,7 @@ def measured_stream(stream: Stream) -> dict[str, Any]:
         said.append(
             (
                 *(one.t, one.phi[0], one.low[0], one.high[0], one.interval == "calibrated", one.settling, back),
-                *(one.p_held, one.p_change, one.p_contact, one.since),
+                *(one.p_held, one.p_change, one.p_contact, one.since, one.held),
             )
         )
     identifier.close()
@@ -172,6 +173,7 @@ def measured_stream(stream: Stream) -> dict[str, Any]:
         "calibrated": float(table[every, 4].mean()),
         "calibrated_and_out": None if stream.base is None else float((~inside & (table[:, 4] == 1.0))[every].mean()),
         "reliability": reliability_of(stream, table, held, every),
+        "held": None if stream.base is None else turns_of_held(turns, table[:, IS_HELD], mass > LEAST, every),
     }
 
 
@@ -233,6 +235,8 @@ def of_part(cells: list[dict[str, Any]]) -> dict[str, Any]:
         "calibrated_and_out": round(float(np.mean(wrong)), 4) if wrong else None,
         "p_change": reliability(cells)["p_change"],
     }
+    if told := [cell["held"] for cell in cells if cell["held"] is not None]:
+        out["held"] = {what: sum(x[what] for x in told) for what in told[0]}
     if changes:
         missed = [x for x in changes if x["delay"] is None]
         told = [x["inside"] for x in changes if x["inside"] is not None]
@@ -313,7 +317,9 @@ def in_all(parts: dict[str, Any]) -> dict[str, Any]:
     which = ("steps", "ramps_0.1", "ramps_0.5", "swaps", "drop", "cycles", *RATES)
     quick = [parts[x] for x in which if x in parts]
     sound = [x["false"] for name, x in parts.items() if is_sound(name)]
+    told = [x["held"] for name, x in parts.items() if is_sound(name)]
     return {
+        "held": {what: sum(x[what] for x in told) for what in told[0]},
         "missed": share(sum(x["missed"]["count"] for x in quick), sum(x["changes"] for x in quick)),
         "false": per_hour(sum(x["count"] for x in sound), sum(x["hours"] for x in sound)),
     }
@@ -355,7 +361,7 @@ def show(result: dict[str, Any], page: Path = PAGE) -> None:
         "error ± half-width [g] after 0.5 · 2 s",
     )
     push, drift, quiet, real = (parts[name] for name in ("pushes", "drift", "quiet", "real_as_is"))
-    pushed = push["pushes"]
+    pushed, held = push["pushes"], result["in_all"]["held"]
     hands = [f"{x['count']} of {x['of']}" for x in pushed["by_link"].values()]
     lines = [
         markdown_table(columns, "lrrrrrrr", rows),
@@ -370,6 +376,10 @@ def show(result: dict[str, Any], page: Path = PAGE) -> None:
         f"{100 * drift['calibrated']:.0f} % are called calibrated. "
         f"Where nothing happens: {_events(quiet)}, {100 * quiet['calibrated']:.0f} % called calibrated. "
         f"The real logs as they are: {_events(real)}.",
+        "",
+        f"Where nobody pushes and the simulated arm stays as it is, something began or ceased to be held "
+        f"{held['should']} times, and `held` turned {held['turned']} times; it was wrong in "
+        f"{100 * held['wrong'] / held['moments']:.1f} % of the moments, tenths of a second from 2.5 s on.",
         "",
         "How often a probability was right, over all moments of all scenes, in tenths of a second:",
         "",

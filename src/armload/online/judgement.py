@@ -100,8 +100,11 @@ class Judgement:
         shown = determined(std, before.std, run.weak_std, self._weak)
         self.determined = determined_with(shown, taken, std, before)
         self.rests_on_prior = ~self.determined | rests_on_prior(shown, taken, std, run.weak_std)
-        self.held = held(float(estimate.phi[0]), float(std[0]), bool(self.determined[0]))
-        self.p_held = held_probability(float(estimate.phi[0]), float(std[0]), float(self._weak[0]))
+        mass, std_of_mass = float(estimate.phi[0]), float(std[0])
+        self.p_held = held_probability(mass, std_of_mass, float(self._weak[0]))
+        # while a payload changes nobody knows the mass, which is no reason to say that it was dropped
+        stays = self.held and self.p_held > 0.5
+        self.held = held(mass, std_of_mass, bool(self.determined[0])) or stays
         notes = []
         if not moving:
             notes.append("not moving: inertia undetermined" if not self.determined[4:].all() else "not moving")
@@ -141,7 +144,8 @@ class Judgement:
         doubt = doubt_of(exchanged, sound, None, 0.0, relative_to=relative_to)
         self._take(estimate, run)
         self.estimate = replace(estimate, phi=body_of(estimate, bool(self.determined[0]), exchanged))
-        self.newest = t
+        self.newest, mass = t, (float(estimate.phi[0]), float(estimate.std[0]))
+        self.held = held(*mass, bool(self.determined[0]))  # as of a log
         self.doubted = doubt is not None or bool(self.doubts.sentences)
         self.notes += () if doubt is None else (doubt,)
 
