@@ -259,8 +259,8 @@ def next_free(record: str) -> str:
 
 def main() -> None:
     """Read the order, run, and end when standard input does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # goes to the whole group; whoever started this decides
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # go to the whole group: whoever started this decides
+        signal.signal(number, signal.SIG_IGN)
     readers: Sequence[Reader] = ()
     try:
         if not (line := _line()):
