@@ -64,11 +64,7 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], 
     asked = any(f.changed is not None for f in findings)
     text = [
         f"{_counted(len(logs), 'log')} of {_counted(len(findings), 'arm')}: {_counted(len(held), 'payload')} carried, "
-        f"{_counted(lost, 'log')} not answered."
-        + (
-            f" {_counted(copies, 'log')} counted that {'is a copy' if copies == 1 else 'are copies'} of others."
-            * (copies > 0)
-        ),
+        f"{_counted(lost, 'log')} not answered." + (f" Copies of others among them: {copies}." if copies else ""),
         *advice,
         ""
         if asked
