@@ -476,6 +476,36 @@ def test_a_refusal_between_two_steps_says_how_much_is_counted(answer):
     assert waits == f"the robot refused the load; it counts {controller.told[-1].mass:.3f} of {mass:.3f} kg"
 
 
+def test_a_controller_whose_client_waits_for_ever_is_said_to_be_silent_and_ends_nothing(answer, monkeypatch):
+    asked, answers = threading.Event(), threading.Event()
+
+    class Silent(Asked):
+        def put(self, load):
+            super().put(load)
+            if len(self.told) == 3:
+                asked.set()
+                answers.wait()
+
+        def close(self):
+            self.ended = -1
+
+    monkeypatch.setattr("armload.service.feedback._SILENT", 0.0)
+    monkeypatch.setattr("armload.service.feedback.FRESH", 1e6)
+    one, _ = feedback(controller := Silent())
+    one.offer(answer, Q, True)
+    one.step()
+    assert one.applied()["mass"] == controller.told[-1].mass
+    assert one.applied()["waits"].startswith("told in steps")
+    one.start()
+    assert asked.wait(30.0)
+    said = one.applied()
+    assert said["mass"] is None
+    assert "the controller has not answered" in said["waits"]
+    one.close()
+    assert controller.ended != -1  # its client is busy
+    answers.set()
+
+
 def test_a_refused_step_ends_the_series(answer):
     class Refusing(Asked):
         def put(self, _):

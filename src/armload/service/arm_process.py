@@ -154,7 +154,7 @@ class ArmProcess:
             "arm_changed": None if self.session is None else self.session.identifier.arm_changed,
         }
         if self._feedback is not None:
-            head["applied"] = {"mass": self._feedback.mass, "waits": self._feedback.waits}
+            head["applied"] = self._feedback.applied()
         if estimate is None:
             self._write({**head, "age": None, "lag": None, "mass": None})
             return

@@ -34,6 +34,7 @@ from armload.service.backoff import Backoff
 # more than 6 mrad/s, which still counts as a standstill (`devices.guard.STANDSTILL`)
 STEP = 5e-3
 PAUSE = 0.2  # [s] between two steps: such a joint has come to rest by then
+_SILENT = 5.0  # [s] a client may take for a look, a step included; of a robot that is gone some try for minutes
 _ENOUGH = 0.1  # of STEP: what is left is not worth a step
 LIGHT = 0.05  # [kg] what differs by more is told, too, where it does not show in the joints of this pose
 _OLDEST = 10.0  # [s] an answer may be: an arm that has stood for longer moves first
@@ -74,6 +75,7 @@ class Feedback:
         self._under_way, self._refused = False, ""
         self._backoff = Backoff(_FIRST, _MOST)
         self._not_taken: tuple[InertialParameters, float, str] | None = None  # what, until when it waits [s], and why
+        self._asking: float | None = None  # since when the controller is being asked or told [s]
         self._gone = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -101,6 +103,8 @@ class Feedback:
         self._gone.set()
         if self._thread is not None:
             self._thread.join(2.0)
+            if self._thread.is_alive():  # the client waits for a robot that is gone, and ends with this process
+                return
         try:
             self._controller.close()
         except Exception as error:
@@ -117,8 +121,18 @@ class Feedback:
             if not self._under_way or self._gone.wait(PAUSE):
                 return self.waits
 
+    def applied(self) -> dict[str, float | str | None]:
+        """`mass` and `waits`, also while a client waits for a robot that is gone; from any thread."""
+        asking = self._asking
+        silent = 0.0 if asking is None else time.monotonic() - asking
+        if silent <= _SILENT:
+            return {"mass": self.mass, "waits": self.waits}
+        why = f"the controller has not answered for {silent:.0f} s: see that the robot is switched on and connected"
+        return {"mass": None, "waits": why}
+
     def step(self) -> None:
         """One look, and one step if it is time for one; what it fails with is said once."""
+        self._asking = time.monotonic()
         try:
             try:
                 self.waits = self._waits()
@@ -135,6 +149,8 @@ class Feedback:
                 begun = "" if isinstance(error, SentError) else "no load is told to the controller: "
                 self._note(f"{begun}{self.waits}")
             self._refused = self.waits
+        finally:
+            self._asking = None
 
     def _waits(self) -> str | None:
         answer, under_way = self._answer, self._under_way
