@@ -75,6 +75,10 @@ class SinkError(ArmloadError, ValueError):
     """A payload that cannot be exported, or must not be written to a robot."""
 
 
+class SentError(SinkError):
+    """A payload that was sent to a robot which counts another one now, or does not say which."""
+
+
 class ClusterError(ArmloadError, ConnectionError):
     """A cluster that is gone, or that has no worker."""
 

@@ -311,3 +311,18 @@ def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served)
     matrix = np.array(answer["inertia_com"])
     expected = matrix.ravel(order="F") if len(numbers) == 13 else matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     assert numbers[4:] == pytest.approx(expected.tolist(), rel=1e-6)
+
+
+@pytest.mark.parametrize("serve", ["ur"], indirect=True)
+@in_time
+def test_a_payload_that_the_controller_does_not_count_is_no_answer_that_was_written_nor_one_that_was_not(served):
+    served.process.stdin.write("forget\n")
+    served.process.stdin.flush()
+    served.wait("forget")
+    code, out, err = served.measure("--move", "--apply", "--mounted", "nothing", "--undetermined-inertia")
+    assert (code, out) == (2, "")
+    line = err.splitlines()[-1]
+    assert "kg and counts 0.000 kg: see on its pendant" in line
+    assert line.endswith("tells the answer")
+    assert "written" not in line
+    assert served.said().count("payload") == 1

@@ -195,7 +195,9 @@ def ur(monkeypatch):
     """A factory of UR movers whose control client fails at something."""
     robot = arm("ur10e")
     still = {"getActualQd": lambda: [0.0] * 6, "getTargetQ": lambda: [0.0] * 6, "isConnected": lambda: True}
-    receive = SimpleNamespace(**still, disconnect=lambda: None)
+    counts = {"getPayload": lambda: 1.0, "getPayloadCog": lambda: [0.0, 0.0, 0.1]}
+    counts["getPayloadInertia"] = lambda: [1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0]
+    receive = SimpleNamespace(**still, **counts, disconnect=lambda: None)
     received = SimpleNamespace(RTDEReceiveInterface=lambda *_: receive)
     monkeypatch.setitem(sys.modules, "rtde_receive", received)
 
@@ -212,7 +214,7 @@ def ur(monkeypatch):
     [
         ("connect", "takes no payload .connect: no.: set it to remote control"),
         ("setTargetPayload", "refused the payload: setTargetPayload: no"),
-        ("stopScript", "cannot be ended .stopScript: no.: see whether it runs"),
+        ("stopScript", "^the arm counts the payload, but .* cannot be ended .stopScript: no.: see whether it runs"),
     ],
 )
 def test_a_ur_that_takes_no_payload_is_a_sentence_and_its_script_is_ended(ur, fails, says):

@@ -292,6 +292,23 @@ def test_a_franka_driver_is_told_in_steps_at_rest_and_its_refusal_is_said(scene)
 
 
 @pytest.mark.full
+@pytest.mark.parametrize("words", ["a motion is running", "gone"])
+def test_a_driver_that_fails_between_two_steps_is_told_no_more_and_what_it_counts_is_said(scene, words):
+    with scene("apply:=franka_ros2", offers=("franka_ros2", words, 2)) as order:
+        at_rest(order)
+        told = order("apply")
+        assert not told["apply"]
+        assert len(order.offered()) == 3
+        counted = order.offered()[1]["mass"]
+        if words == "gone":
+            assert (
+                "does not answer within 5 s, and may have taken the load: see that the driver runs" in told["message"]
+            )
+        else:
+            assert f"{words}; it counts {counted:.3f} of " in told["message"]
+
+
+@pytest.mark.full
 def test_a_ur_driver_is_told_inertia_and_a_transition_and_by_itself_where_that_is_asked(scene):
     with scene("apply:=ur_robot_driver", "apply_auto:=true", offers=("ur_robot_driver",)) as order:
         known = at_rest(order)

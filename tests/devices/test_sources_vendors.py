@@ -131,6 +131,7 @@ def test_every_state_arrives_as_the_robot_sent_it(system, address, tmp_path):
             assert source.lost == 0
         stood = next(event for event in events if event["event"] == "moves")["tick"]
     assert f"{name}://{address} was lost" in text  # the log was over: the server fell silent
+    assert "see that the robot is switched on, its cable is in, and FCI is activated in Desk" in text
     t = rows[:, 0]
     assert np.all(np.diff(t) > 0)
     place = np.round(1000 * (t - log["t"][0])).astype(int) - stood
@@ -322,6 +323,7 @@ def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp
         asked = next(event for event in events if event["event"] == "fields")
     assert asked["rate"] == 500.0
     assert "was lost" in text
+    assert "see that the robot is switched on, its cable is in, and RTDE is enabled" in text
     with pytest.raises(SourceError, match="cannot be reached"):
         open_source(f"ur://{address}", robot)
     assert capfd.readouterr() == ("", "")  # the client prints a line of its own at either end

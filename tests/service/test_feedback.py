@@ -16,7 +16,7 @@ import pytest
 
 from armload.arms import arm
 from armload.devices import Counted, Detached, Load, check_writable, controller_of
-from armload.errors import SinkError, SourceError, UsageError
+from armload.errors import SentError, SinkError, SourceError, UsageError
 from armload.inertia import InertialParameters, is_consistent
 from armload.motion import FourierMotion, save_motion, taie2024
 from armload.online import OnlineEstimate, OnlineIdentifier
@@ -419,6 +419,91 @@ def test_a_service_tells_a_ur_between_two_motions_of_its_program_what_it_identif
     assert scripts
     assert all(event["speed"] < 0.02 for event in scripts), scripts  # [rad/s]
     assert "moving" not in [event["event"] for event in said]  # no script commanded a motion
+
+
+def test_what_was_not_taken_is_not_told_again_at_once_but_another_load_and_who_asks_are(answer, monkeypatch):
+    class Refusing(Asked):
+        def put(self, load):
+            super().put(load)
+            self.told.pop()
+            tried.append(load.parameters.mass)
+            raise SentError("the robot refused the load")
+
+    monkeypatch.setattr("armload.service.feedback._FIRST", 1e6)  # [s]
+    monkeypatch.setattr("armload.service.feedback._MOST", 1e6)
+    tried = []
+    one, notes = feedback(Refusing())
+    for _ in range(20):
+        one.offer(answer, Q, True)
+        one.step()
+    assert len(tried) == 1
+    assert one.waits.startswith("the robot refused the load (told again in ")
+    assert one.mass == 0.0  # as the controller says, which was asked again
+    assert notes == ["the robot refused the load"]
+    one.offer(changed(answer, phi=1.5 * answer.phi), Q, True)
+    one.step()
+    assert len(tried) == 2
+    one.offer(changed(answer, phi=1.5 * answer.phi), Q, True)
+    assert one.finish() == "the robot refused the load"
+    assert len(tried) == 3
+
+
+def test_a_controller_that_is_lost_after_a_step_is_said_to_have_been_told_and_to_count_nobody_knows_what(answer):
+    class Lost(Asked):
+        def counted(self):
+            if len(self.told) > 3:
+                raise SourceError("the robot was lost")
+            return super().counted()
+
+    one, notes = feedback(Lost())
+    waits = told(one, answer)
+    assert "was told" in waits
+    assert "does not say what it counts now (the robot was lost)" in waits
+    assert one.mass is None
+    assert notes == [waits]
+
+
+def test_a_refusal_between_two_steps_says_how_much_is_counted(answer):
+    class Tired(Asked):
+        def put(self, load):
+            if len(self.told) > 3:
+                raise SinkError("the robot refused the load")
+            super().put(load)
+
+    one, _ = feedback(controller := Tired())
+    mass = answer.phi[0]
+    waits = told(one, answer)
+    assert waits == f"the robot refused the load; it counts {controller.told[-1].mass:.3f} of {mass:.3f} kg"
+
+
+def test_a_controller_whose_client_waits_for_ever_is_said_to_be_silent_and_ends_nothing(answer, monkeypatch):
+    asked, answers = threading.Event(), threading.Event()
+
+    class Silent(Asked):
+        def put(self, load):
+            super().put(load)
+            if len(self.told) == 3:
+                asked.set()
+                answers.wait()
+
+        def close(self):
+            self.ended = -1
+
+    monkeypatch.setattr("armload.service.feedback._SILENT", 0.0)
+    monkeypatch.setattr("armload.service.feedback.FRESH", 1e6)
+    one, _ = feedback(controller := Silent())
+    one.offer(answer, Q, True)
+    one.step()
+    assert one.applied()["mass"] == controller.told[-1].mass
+    assert one.applied()["waits"].startswith("told in steps")
+    one.start()
+    assert asked.wait(30.0)
+    said = one.applied()
+    assert said["mass"] is None
+    assert "the controller has not answered" in said["waits"]
+    one.close()
+    assert controller.ended != -1  # its client is busy
+    answers.set()
 
 
 def test_a_refused_step_ends_the_series(answer):

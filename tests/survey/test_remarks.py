@@ -13,7 +13,9 @@ from armload.motion import random_motion
 from armload.recording import write_recording
 from armload.simulation import simulate_inverse
 from armload.survey import Settings, find_logs, read_rows, survey
-from armload.survey.remarks import of_copies
+from armload.survey.findings import arm_findings
+from armload.survey.remarks import copies_among, of_copies
+from armload.survey.report import survey_sections
 
 SETTINGS = Settings("panda", method="map")
 
@@ -143,9 +145,9 @@ def test_a_damaged_table_with_its_cells_is_written_anew(logs, tmp_path):
 
 def test_copies_are_counted_as_the_survey_counts_logs_each_episode_for_one():
     a, b = ([(name, k, x) for k, x in enumerate(contents)] for name, contents in (("a", "xyz"), ("b", "x-z")))
-    said = of_copies([*a, *b, ("c", None, "x"), ("d", None, "x")])
+    said = of_copies(copies_among([("d", None, "x"), *b, *a, ("c", None, "x")]))
     assert said.startswith("3 logs are copies of others, packed or not (b (2 episodes) of a, d of c): ")
-    assert of_copies([*a, ("b", 0, ""), ("c", 0, "")]) == ""
+    assert of_copies(copies_among([*a, ("b", 0, ""), ("c", 0, "")])) == ""
 
 
 @pytest.mark.full  # some seconds
@@ -155,7 +157,7 @@ def test_copies_of_a_log_are_said_to_be_there_and_broken_files_are_none(logs, tm
     (logs / "0.csv.gz").write_bytes(gzip.compress((logs / "0.csv").read_bytes()))
     for name in ("no.csv", "none.csv"):
         (logs / name).write_text("")
-    found, said = said_of([logs], tmp_path / "out.csv")
+    found, said = said_of([logs], out := tmp_path / "out.csv")
     (line,) = [line for line in said if "cop" in line]
     assert line.startswith(
         f"3 logs are copies of others, packed or not ({logs}/0.csv.gz of {logs}/0.csv, "
@@ -163,3 +165,14 @@ def test_copies_of_a_log_are_said_to_be_there_and_broken_files_are_none(logs, tm
     )
     assert f"{logs}/link.csv of {logs}/1.csv" in line
     assert found.logs == 7
+    rows, n = read_rows(out)
+    marked = {row["log"]: row["notes"].rpartition(" | ")[2] for row in rows if "a copy" in row["notes"]}
+    assert marked == {
+        f"{logs}/{copy}": f"a copy, packed or not, of {logs}/{original}"
+        for copy, original in (("0.csv.gz", "0.csv"), ("copy of 0.csv", "0.csv"), ("link.csv", "1.csv"))
+    }
+    sections = survey_sections(rows, arm_findings(rows), n)
+    assert "Copies of others among them: 3." in sections[0].text
+    assert sections[-1].title == "Copies"
+    cells = {("0.csv.gz", "0.csv"), ("copy of 0.csv", "0.csv"), ("link.csv", "1.csv")}
+    assert set(sections[-1].tables[0].rows) == cells

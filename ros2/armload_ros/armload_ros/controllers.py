@@ -22,7 +22,7 @@ from armload.devices import Counted, Load, check_writable, is_moving
 from armload.devices.franka.form import franka_load
 from armload.devices.guard import flange_of
 from armload.devices.ur.form import ur_payload
-from armload.errors import SinkError
+from armload.errors import SentError, SinkError
 from armload.inertia import InertialParameters
 from armload.service.feedback import PAUSE
 
@@ -170,14 +170,17 @@ def _imported(package: str, where: str, name: str) -> Any:
 def _call(client: Any, service: str, request: Any) -> None:
     """Call from a thread that does not spin, and wait for the answer."""
     if not client.wait_for_service(_PATIENCE):
-        raise SinkError(f"nobody offers the service {service}")
+        raise SinkError(f"nobody offers the service {service}: see that the driver runs, in this node's namespace")
     answered = threading.Event()
     future = client.call_async(request)
     future.add_done_callback(lambda _: answered.set())
     if not answered.wait(_PATIENCE):
         client.remove_pending_request(future)
-        raise SinkError(f"the service {service} does not answer")
+        raise SentError(
+            f"the service {service} does not answer within {_PATIENCE:g} s, and may have taken the load: see that the "
+            "driver runs, and apply it again"
+        )
     response = future.result()
     if not response.success:
         why = getattr(response, "error", "")
-        raise SinkError(f"the service {service} refused the load" + (f": {why}" if why else ""))
+        raise SinkError(f"the service {service} refused the load: " + (why or "see the driver's log"))

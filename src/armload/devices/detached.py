@@ -43,6 +43,14 @@ _TO_END = 3.0  # [s]
 TO_REST = 6.0  # [s] a moving arm may take to come to rest, which is longer than any braking time that is tried
 
 
+class Refused(SourceError):
+    """What a reader was asked for and did not do; sent: the robot was told all the same (`SentError`)."""
+
+    def __init__(self, message: str, sent: bool) -> None:
+        super().__init__(message)
+        self.sent = sent
+
+
 class Detached(Source):
     """Any source of `open_source`, read in another process.
 
@@ -238,6 +246,8 @@ class Detached(Source):
         event = self._event(_TO_OBEY)
         while event is not self._last and event.get("number") != number:  # a call that was given up is answered late
             event = self._event(_TO_OBEY)
+        if event["event"] == "refused":
+            raise Refused(event["message"], event["sent"])
         if event["event"] != "answer":
             raise SourceError(event.get("message", f"{self.name} ended before it answered"))
         return event["value"]

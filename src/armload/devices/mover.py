@@ -73,6 +73,13 @@ class Mover(Source):
     def stop(self, why: str) -> None:
         """Let the arm come to rest on its path, soon; from any thread. Nothing happens at rest."""
 
+    def silence(self, seconds: float) -> str:
+        """What to say where no sample came for so many seconds while the arm was on its way."""
+        return (
+            f"{self.name} was lost: no sample for {seconds:g} s while the arm was on its way; see that it is switched "
+            "on and its cable is in, and open it again"
+        )
+
     def mount(self) -> bool:
         """Put on the payload, where the mover can (a simulator); False: somebody has to."""
         return False
@@ -144,7 +151,7 @@ class StreamedMover(Mover):
             why = f"no sample came for {passed:.2f} s"
             self._silent(movement, passed)
         else:
-            why = f"the clock of its samples jumped by {passed:+.2f} s"
+            why = f"the clock of its samples jumped by {passed:+.2f} s (see what sets it)"
             self._jumped(movement, passed)
         self.why = self._stop_for = self._stop_for or why
 
@@ -225,10 +232,7 @@ def samples_of_movement(mover: Mover, motion: Motion, thresholds: Thresholds | N
     for sample in mover.ticking(_LOOK):
         if sample is None:
             if time.monotonic() - heard > _LOST:
-                raise SourceError(
-                    f"{mover.name} was lost: no sample for {_LOST:g} s while the arm was on its way; see that it is "
-                    "switched on and its cable is in, and open it again"
-                )
+                raise SourceError(mover.silence(_LOST))
             continue
         heard = time.monotonic()
         yield sample

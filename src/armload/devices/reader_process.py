@@ -36,7 +36,7 @@ from armload.devices.recorder import Recorder
 from armload.devices.remote_mover import RemoteMover
 from armload.devices.ring import Ring
 from armload.devices.source import Source
-from armload.errors import ArmloadError, PayloadError, SourceError, SourceSetupError
+from armload.errors import ArmloadError, PayloadError, SentError, SourceError, SourceSetupError
 from armload.runtime.extras import missing
 
 _CALLS = ("read_once", "set_load", "hold")  # what may be asked of a source from outside
@@ -129,7 +129,8 @@ class _Reader:
             value = getattr(source, method)(*given)
             self.report(event="answer", number=command["number"], value=value)
         except ArmloadError as error:
-            self.report(event="refused", number=command["number"], message=str(error))
+            sent = isinstance(error, SentError)
+            self.report(event="refused", number=command["number"], message=str(error), sent=sent)
 
     def listen(self, source: Source, lines: Iterator[bytes]) -> None:
         """Take commands until standard input ends; then end the source, and if it does not, the process."""

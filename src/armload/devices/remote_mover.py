@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.devices.detached import TO_REST, Detached
+from armload.devices.detached import TO_REST, Detached, Refused
 from armload.devices.load import Load
 from armload.devices.mover import Mover, check_start
 from armload.devices.source import Source
 from armload.devices.supervision import Thresholds
-from armload.errors import SafetyError, SinkError, SourceError
+from armload.errors import SafetyError, SentError, SinkError, SourceError
 from armload.inertia import InertialParameters
 from armload.motion import Motion, PathMotion
 from armload.recording import Sample
@@ -153,10 +153,17 @@ class DetachedMover(Detached, Mover):
             "relative_to": load.relative_to,
             "std": None if load.std is None else load.std.tolist(),
         }
+        if self.process.poll() is not None:
+            raise SinkError(f"{self.name} was lost before: see that the robot is on and connected")
         try:
             return self._call("put", content, allow_undetermined_inertia)
-        except SourceError as error:
-            raise SinkError(str(error)) from None
+        except Refused as error:
+            raise (SentError if error.sent else SinkError)(str(error)) from None
+        except SourceError as error:  # nobody can say how far it came
+            raise SentError(
+                f"whether the payload was written is not known ({error}): see on the robot's pendant or in Desk which "
+                "one it counts"
+            ) from None
 
     def _note(self, beside: NDArray[np.float64]) -> None:
         super()._note(beside)

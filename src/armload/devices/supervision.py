@@ -62,7 +62,12 @@ class Supervision:
         arm: bare, or with what is known to be mounted.
         motion: the movement.
         thresholds: where it is stopped.
+
+    Attributes:
+        off: what to look at where the arm is off the path; "": nothing in particular.
     """
+
+    off = ""
 
     def __init__(self, arm: Arm, motion: Motion, thresholds: Thresholds) -> None:
         self._arm, self._thresholds = arm, thresholds
@@ -92,9 +97,10 @@ class Supervision:
         k = int(np.argmin(away.max(axis=1)))
         j = int(np.argmax(away[k]))
         if away[k, j] > self._thresholds.tracking:
+            see = f"; {self.off}" if self.off else ""
             return (
                 f"{self._arm.joint_names[j]} is {away[k, j]:.3f} rad off the path (more than "
-                f"{self._thresholds.tracking:g} rad)"
+                f"{self._thresholds.tracking:g} rad{see})"
             )
         return self._pushed(t, sample, course, float(last))
 

@@ -209,6 +209,11 @@ class Procedure:
                 return self.mover.commanded()
             asked = sample.t if asked is None and fresh else asked
             if fresh and begun is None and asked is not None and sample.t - asked > patience:
+                if not np.all(np.isfinite(sample.dq)):
+                    raise SafetyError(
+                        f"{self.mover.name} does not say how fast its joints are: expected finite velocities, without "
+                        "which nobody knows whether it stands; see what its driver sends"
+                    )
                 raise SafetyError(f"{self.mover.name} moves: a measurement begins at rest; stop it first")
         raise SourceError(f"{self.mover.name} ended before its first sample")
 

@@ -154,7 +154,7 @@ class ArmProcess:
             "arm_changed": None if self.session is None else self.session.identifier.arm_changed,
         }
         if self._feedback is not None:
-            head["applied"] = {"mass": self._feedback.mass, "waits": self._feedback.waits}
+            head["applied"] = self._feedback.applied()
         if estimate is None:
             self._write({**head, "age": None, "lag": None, "mass": None})
             return
@@ -259,8 +259,8 @@ def next_free(record: str) -> str:
 
 def main() -> None:
     """Read the order, run, and end when standard input does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # goes to the whole group; whoever started this decides
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # go to the whole group: whoever started this decides
+        signal.signal(number, signal.SIG_IGN)
     readers: Sequence[Reader] = ()
     try:
         if not (line := _line()):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from armload.recording import NAMED_SUFFIXES, PACKED_SUFFIXES, is_log, is_part_of_bag
@@ -78,17 +78,25 @@ def of_bags(logs: Iterable[tuple[str, Sequence[Path]]]) -> str:
     )
 
 
-def of_copies(contents: Iterable[tuple[str, int | None, str]]) -> str:
-    """The sentence on logs (name, episode, content) with the content of others; empty: there are none."""
+def copies_among(contents: Iterable[tuple[str, int | None, str]]) -> dict[tuple[str, int | None], str]:
+    """Which logs (name, episode, content) have the content of another one, the first by name, and of which."""
     first: dict[tuple[int | None, str], str] = {}
-    copies: dict[tuple[str, str], list[int | None]] = {}
-    for name, episode, content in contents:
+    copies: dict[tuple[str, int | None], str] = {}
+    for name, episode, content in sorted(contents, key=lambda log: log[0]):
         original = first.setdefault((episode, content), name)
         if content and original != name:
-            copies.setdefault((name, original), []).append(episode)
-    if not copies:
+            copies[name, episode] = original
+    return copies
+
+
+def of_copies(found: Mapping[tuple[str, int | None], str]) -> str:
+    """The sentence on logs that are copies (`copies_among`); empty: there are none."""
+    if not found:
         return ""
-    count = sum(map(len, copies.values()))
+    copies: dict[tuple[str, str], list[int | None]] = {}
+    for (name, episode), original in found.items():
+        copies.setdefault((name, original), []).append(episode)
+    count = len(found)
     logs = "1 log is a copy" if count == 1 else f"{count} logs are copies"
     some = _some([f"{_named(name, of)} of {original}" for (name, original), of in copies.items()])
     return f"{logs} of others, packed or not ({some}): each counts as a log of its own"

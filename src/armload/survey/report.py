@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from armload.lab.report.shown import Table
 from armload.lab.report.style import COLOURS, look, new_figure
 from armload.survey.findings import LAST, SHARE_CHANGED, SHARE_MOVES, ArmFinding, arm_findings, by_log, doubtful
 from armload.survey.looseness import LOOSE
-from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE, shows_the_arm
+from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE, original_of, shows_the_arm
 from armload.survey.shift import SHIFTED
 from armload.survey.table_file import read_rows
 from armload.survey.time_axis import are_dated, mark, time_label, times_of, whole
@@ -46,15 +46,17 @@ def write_survey_report(table: str | Path, out: str | Path) -> list[str]:
 
 def survey_sections(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int) -> list[Section]:
     """The page's sections, for `write_report`. rows: of arms with n joints. findings: what they say of each arm."""
-    return [
-        _what_to_do(rows, findings),
+    copies = {(row["log"], row["episode"]): of for row in rows if (of := original_of(row)) is not None}
+    sections = [
+        _what_to_do(rows, findings, len(copies)),
         _payloads(rows, findings),
         _arms(rows, findings, n),
         _doubts(rows, findings),
     ]
+    return [*sections, _copies(copies)] if copies else sections
 
 
-def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) -> Section:
+def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], copies: int) -> Section:
     logs = {(row["log"], row["episode"]) for row in rows}
     held = [row for row in rows if row["status"] == ANSWERED and row["held"]]
     lost = sum(row["status"] == UNUSABLE for row in rows)
@@ -62,7 +64,7 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) 
     asked = any(f.changed is not None for f in findings)
     text = [
         f"{_counted(len(logs), 'log')} of {_counted(len(findings), 'arm')}: {_counted(len(held), 'payload')} carried, "
-        f"{_counted(lost, 'log')} not answered.",
+        f"{_counted(lost, 'log')} not answered." + (f" Copies of others among them: {copies}." if copies else ""),
         *advice,
         ""
         if asked
@@ -215,7 +217,7 @@ def _doubts(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) -> S
     folder = _folder([row["log"] for row in found])
     cells = tuple(
         (
-            row["log"].removeprefix(folder) + ("" if row["episode"] is None else f", episode {row['episode']}"),
+            _named(row["log"], row["episode"], folder),
             row["arm"],
             "" if row["t0"] is None else f"{row['t0']:.1f}–{row['t1']:.1f}",
             "" if row["status"] == UNUSABLE else f"{row['mass']:.3f}",
@@ -233,6 +235,22 @@ def _doubts(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) -> S
         prose=(4,),
     )
     return Section("Logs in doubt", f"Look at these before anything is concluded from them.{more}", (table,))
+
+
+def _copies(copies: Mapping[tuple[str, int | None], str]) -> Section:
+    """Which logs are copies, and of which; each counts as a log of its own."""
+    folder = _folder([*(log for log, _ in copies), *copies.values()])
+    cells = tuple(
+        (_named(log, episode, folder), original.removeprefix(folder)) for (log, episode), original in copies.items()
+    )
+    more = f" The first {_MOST_ROWS} of {len(cells)}." if len(cells) > _MOST_ROWS else ""
+    where = f"Logs are in {folder}." if folder else ""
+    table = Table("Logs that are copies of others", ("log", "copy of"), cells[:_MOST_ROWS], where)
+    return Section("Copies", f"Each counts as a log of its own, here and in every figure.{more}", (table,))
+
+
+def _named(log: str, episode: int | None, folder: str) -> str:
+    return log.removeprefix(folder) + ("" if episode is None else f", episode {episode}")
 
 
 def _urgency(row: dict[str, Any], known: set[str]) -> int:

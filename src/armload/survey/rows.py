@@ -15,6 +15,7 @@ ANSWERED, UNUSABLE = "answered", "unusable"
 _AXES = ("x", "y", "z")
 _PRODUCTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 SEPARATOR = " | "  # between notes, and between determined parameters: sentences have commas
+_COPY = "a copy, packed or not, of "  # what the last note of a log that is one begins with; the other's name follows
 
 TEXT, WHOLE, FLAG, NUMBER = "text", "whole", "flag", "number"
 
@@ -86,6 +87,23 @@ def unusable(reason: str, where: dict[str, Any]) -> dict[str, Any]:
     """The row of a log that cannot be answered."""
     empty = dict.fromkeys(("determined", "interval", "method", "relative_to", "notes"), "")
     return where | empty | {"status": UNUSABLE, "reason": " ".join(reason.split())}
+
+
+def as_copy(row: dict[str, Any], original: str | None) -> dict[str, Any]:
+    """The row of a log that is a copy of another one, which its last note says; None: it is none.
+
+    >>> as_copy({"notes": "short"}, "a.csv"), as_copy({"notes": ""}, "a.csv"), as_copy({"notes": ""}, None)
+    ({'notes': 'short | a copy, packed or not, of a.csv'}, {'notes': 'a copy, packed or not, of a.csv'}, {'notes': ''})
+    """
+    if original is None:
+        return row
+    return row | {"notes": SEPARATOR.join(filter(None, (row["notes"], f"{_COPY}{original}")))}
+
+
+def original_of(row: Mapping[str, Any]) -> str | None:
+    """The log that a row's log is a copy of; None: it is none."""
+    last = row["notes"].rpartition(SEPARATOR)[2]
+    return last.removeprefix(_COPY) if last.startswith(_COPY) else None
 
 
 def _of_payload(found: Identification) -> dict[str, Any]:

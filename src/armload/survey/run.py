@@ -22,8 +22,8 @@ from armload.lab.cells import load_cells, of_damaged
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
 from armload.survey.logs import Log, cells_of, find_logs
-from armload.survey.remarks import of_bags, of_copies, of_left_out, of_passed
-from armload.survey.rows import UNUSABLE
+from armload.survey.remarks import copies_among, of_bags, of_copies, of_left_out, of_passed
+from armload.survey.rows import UNUSABLE, as_copy
 from armload.survey.settings import Settings
 from armload.survey.table_file import check_suffix, logs_in_table, whole, write_rows
 
@@ -120,9 +120,10 @@ def survey(
     of_each = [cells.get(task.name) or before[task.name] for task in tasks]
     answered = [(log, cell) for log, cell in zip(logs, of_each, strict=True) if cell["rows"][0]["status"] != UNUSABLE]
     # a cell of an earlier version knows its content as it is packed only
-    if remark := of_copies((log.name, log.episode, cell.get("unpacked", cell["content"])) for log, cell in answered):
+    copies = copies_among((log.name, log.episode, cell.get("unpacked", cell["content"])) for log, cell in answered)
+    if remark := of_copies(copies):
         say(remark)
-    rows = [row for cell in of_each for row in cell["rows"]]
+    rows = [as_copy(row, copies.get((row["log"], row["episode"]))) for cell in of_each for row in cell["rows"]]
     rows.sort(key=lambda row: (row["log"], -1 if row["episode"] is None else row["episode"], row.get("part") or 0))
     write_rows(out, rows, n)
     return Survey(rows, len(logs), len(fresh), tuple(sorted(passed)))

@@ -1,11 +1,14 @@
 """What a driver or MoveIt offers to whoever knows the load: takes it, prints it, refuses it if told so.
 
-    offer_services.py franka_ros2|ur_robot_driver|moveit [REFUSAL]
+    offer_services.py franka_ros2|ur_robot_driver|moveit [REFUSAL [TAKEN]]
+
+It refuses after TAKEN loads (0); a REFUSAL of "gone" is no answer: it takes a load and ends.
 
 The names and types are those of franka_ros2, ur_robot_driver and MoveIt. Plain rclpy; run by test_ros2_package.py.
 """
 
 import json
+import os
 import sys
 from importlib import import_module
 
@@ -18,6 +21,8 @@ OFFERED = {
 }
 package, kind, service = OFFERED[sys.argv[1]]
 refusal = sys.argv[2] if len(sys.argv) > 2 else None
+taken = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+requests = []
 
 
 def plain(value):
@@ -33,8 +38,11 @@ def plain(value):
 
 def take(request, response):
     print(json.dumps(plain(request)), flush=True)
-    response.success = refusal is None
-    if refusal is not None and hasattr(response, "error"):
+    requests.append(request)
+    response.success = refusal is None or len(requests) <= taken
+    if not response.success and refusal == "gone":
+        os._exit(0)
+    if not response.success and hasattr(response, "error"):
         response.error = refusal
     return response
 

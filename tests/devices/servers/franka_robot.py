@@ -5,11 +5,13 @@ joint positions is expected for every state, and Move is answered once more, wit
 has finished. Commands that stay away end the motion, and the arm brakes by itself.
 
 It prints one JSON line per event: ready, moving, rest (with q), lost, payload, mounted. A line on standard input says
-mount.
+mount, or names a fault, which is printed, too: refuse (no load is taken), forget (a load is taken and not counted), die
+(the robot loses its power at a load).
 """
 
 import argparse
 import contextlib
+import os
 import re
 import select
 import socket
@@ -26,6 +28,7 @@ VERSIONS = {"panda": 5, "fr3": 10}
 FILTER = 0.01  # [s] by which it smooths commands: on a busy machine some are left out
 MOVE, STOP_MOVE = 1, 2
 STARTED, SUCCESS, ABORTED = 1, 0, 2
+REFUSED = 2  # of a setter: not possible in the present mode
 PATIENCE = 300  # cycles without a command: a robot bears 20, the machines of tests are busier
 # number; q, dq, pose, twist, elbow; elbow valid, finished; torques, and of version 10 whether they are finished
 COMMANDS = {5: struct.Struct("<Q38d2?7d"), 10: struct.Struct("<Q38d2?7d?")}
@@ -46,6 +49,7 @@ def serve(connection, client, address, body, version):
     udp.bind((address, 0))
     udp.setblocking(False)
     port, start, tick, move, silent, moved, told = None, None, 0, None, 0, False, False
+    fault = ""
 
     def reply(command, number, answer):
         connection.sendall(struct.pack("<3I", command, number, 12 + len(answer)) + answer)
@@ -54,9 +58,13 @@ def serve(connection, client, address, body, version):
         while True:
             due = None if start is None else max(0.0, start + tick * CYCLE - time.monotonic())
             readable, _, _ = select.select([connection, sys.stdin], [], [], due)
-            if sys.stdin in readable and sys.stdin.readline().strip() == "mount":
+            word = sys.stdin.readline().strip() if sys.stdin in readable else ""
+            if word == "mount":
                 body.mount()
                 say("mounted")
+            elif word:
+                fault = word
+                say(word)
             if connection in readable:
                 command, number, size = struct.unpack("<3I", receive(connection, 12))
                 asked = receive(connection, size - 12)
@@ -76,7 +84,13 @@ def serve(connection, client, address, body, version):
                 elif command == SET_LOAD[version]:
                     load = struct.unpack("<13d", asked)
                     say("payload", numbers=load)
-                    reply(command, number, b"\0")
+                    if fault == "die":
+                        os._exit(0)
+                    if not fault:
+                        state.numbers[state.at["m_load"]] = load[0]
+                        state.numbers[state.at["F_x_Cload"]] = load[1:4]
+                        state.numbers[state.at["I_load"]] = load[4:]
+                    reply(command, number, bytes([REFUSED if fault == "refuse" else SUCCESS]))
                 elif command == GET_MODEL and version == 10:
                     reply(command, number, b"\0" + urdf.encode())
                 else:

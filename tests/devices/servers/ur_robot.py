@@ -8,7 +8,9 @@ itself.
 
 It prints one JSON line per event: ready, script, moving, stopped, ended, mounted, payload, lost, rest. A line on
 standard input says mount, or `work FILE`: from then on a program of its own follows the motion in that file and rests
-for a while, in turns. A client's script takes that program's place; after it, the program begins anew.
+for a while, in turns. A client's script takes that program's place; after it, the program begins anew. Or it names a
+fault, which is printed, too: local (no remote control), refuse (its script ends at a payload), forget (a payload is
+taken and not counted), die (the arm loses its power at a payload).
 """
 
 import argparse
@@ -62,6 +64,7 @@ class Robot:
         self.payload = [0.0] * 10
         self.tick = 0
         self.work, self.worked = None, 0.0
+        self.fault = ""
 
     def run(self):
         begun = time.monotonic()
@@ -122,8 +125,13 @@ class Robot:
         elif number == WATCHDOG:
             self.patience = 1.0 / numbers[0]
         elif number == SET_TARGET_PAYLOAD:
-            self.payload = numbers[:10]
             say("payload", numbers=numbers)
+            if self.fault == "refuse":
+                self.end("ended")
+            elif self.fault == "die":
+                os._exit(0)
+            elif self.fault != "forget":
+                self.payload = numbers[:10]
         elif number == END:
             self.end("ended")
 
@@ -182,6 +190,7 @@ def dashboard(connection, robot):
     for line in connection.makefile():
         word = line.strip()
         said = f"Program running: {str(robot.running).lower()}" if word == "running" else ANSWERS.get(word, "ok")
+        said = "false" if word == "is in remote control" and robot.fault == "local" else said
         connection.sendall((said + "\n").encode())
 
 
@@ -232,6 +241,9 @@ def main():
                 say("mounted")
             elif word == "work":
                 robot.work = load_motion(file)
+            else:
+                robot.fault = word
+                say(word)
 
 
 if __name__ == "__main__":

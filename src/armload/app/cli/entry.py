@@ -20,7 +20,9 @@ import difflib
 import importlib
 import logging
 import os
+import signal
 import sys
+import threading
 import time
 import traceback
 import warnings
@@ -86,7 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
         elif stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")  # nor does a file's name that is no UTF-8 stop it
-    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost():
+    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost(), _ended_by_hangup():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)
     drop_unwritten()  # reported already; the interpreter flushes once more when it ends
@@ -186,6 +188,27 @@ def _no_interruption_lost() -> Iterator[None]:
         sys.unraisablehook = before
 
 
+@contextmanager
+def _ended_by_hangup() -> Iterator[None]:
+    """A terminal that is closed (SIGHUP) ends a command as Ctrl-C does; under nohup, which ignores it, it goes on.
+
+    Only the first one counts: the shell passes on what the terminal has sent, and would break off what is being ended.
+    """
+
+    def interrupt(*_: object) -> None:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+        yield
+        return
+    before = signal.signal(signal.SIGHUP, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def _run(arguments: list[str]) -> int:
     if not arguments:
         raise UsageError(f"no command: expected one of {', '.join(COMMANDS)}; see 'armload --help'")
@@ -222,7 +245,7 @@ def _overview() -> Parser:
 def _fail(message: str, code: int, show_traceback: bool) -> int:
     if show_traceback:
         traceback.print_exc()
-    print(f"armload: {' '.join(message.split())}", file=sys.stderr)
+    print_note(message)
     return code
 
 

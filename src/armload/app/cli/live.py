@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import (
@@ -193,10 +192,7 @@ def run(options: argparse.Namespace) -> int | None:
     age, aged = age_of(tare, began, options.tare_age)
     for note in aged:
         _warn(note)
-    with (
-        ended_by_sigterm() if options.learn else nullcontext(),
-        Steadied(source) if options.steady else source as source,
-    ):
+    with ended_by_sigterm(), Steadied(source) if options.steady else source as source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         more = {"known": known, "recorder": recorder, "tare_age": age}
         session = Session(source, arm, tare, options.method, _warn, profile, **more)

@@ -23,8 +23,8 @@ from armload.app.cli.named import (
     world_of,
 )
 from armload.app.cli.printing import print_json, print_note, working, write_json
-from armload.errors import MotionError, SafetyError, SinkError, UsageError
-from armload.runtime.interruption import ended_by_sigterm
+from armload.errors import MotionError, SafetyError, SentError, SinkError, UsageError
+from armload.runtime.interruption import ended_by_sigterm, held_back
 
 __all__ = ["parser", "run"]
 
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> int | None:
     _, tare = read_logs(options, arm, None, options.tare)
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
     simulated = {} if options.source != "sim" else _simulated(options, arm, motion, loaded=tare is not None)
-    with open_mover(options.source, arm, **simulated) as mover:
+    with ended_by_sigterm(), open_mover(options.source, arm, **simulated) as mover:
         if motion is None:
             motion = _designed(arm, mover.commanded(), profile, Basis(**known).heaviest, options)
         if options.apply and not mover.writes:
@@ -90,8 +90,7 @@ def run(options: argparse.Namespace) -> int | None:
             procedure.plan.check()
             print_json(procedure.plan.to_dict()) if options.json else print(procedure.plan)
             return None
-        with ended_by_sigterm():
-            found = procedure.run(_consent(options), _mount(options, mover))
+        found = procedure.run(_consent(options), _mount(options, mover))
         for note in found.answer.notes:
             print_note(note)
         if options.out is not None:
@@ -168,14 +167,14 @@ def _designed(
 def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
     def ask(plan: Plan) -> bool:
         print(plan, file=sys.stderr, flush=True)
-        return options.move or _typed_yes("type yes to let the arm move: ")
+        return options.move or _typed_yes("type yes to let the arm move: ", "nothing was moved")
 
     return ask
 
 
-def _typed_yes(question: str) -> bool:
+def _typed_yes(question: str, otherwise: str) -> bool:
     if not sys.stdin.isatty():
-        raise SafetyError("nothing was moved: nobody is at a terminal to agree; look at --dry-run, then give --move")
+        raise SafetyError(f"{otherwise}: nobody is at a terminal to agree; look at --dry-run, then give --move")
     return _typed(question).strip() == "yes"
 
 
@@ -231,14 +230,21 @@ def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Nam
         load = load + mounted
     elif options.mounted == "nothing":
         load = load + InertialParameters.zero(found.answer.frame)
-    if not options.move and not _typed_yes("type yes to write it to the controller: "):
+    if not options.move and not _typed_yes("type yes to write it to the controller: ", "nothing was written"):
         raise SafetyError("nothing was written: there was no consent")
-    try:
-        sent = mover.write(load, allow_undetermined_inertia=options.undetermined_inertia)
-    except SinkError as error:
-        again = f"armload identify {found.loaded} --robot {options.robot} --tare {found.empty or options.tare}"
-        raise SinkError(f"nothing was written: {error}; `{again}` tells the answer") from None
-    print_note(f"written to {mover.name}: {sent}")
+    failed = None
+    with held_back() as interruption:  # whoever interrupts is told all the same what the controller counts
+        try:
+            sent = mover.write(load, allow_undetermined_inertia=options.undetermined_inertia)
+            print_note(f"written to {mover.name}, which counts it: {sent}")
+        except SinkError as error:
+            again = f"armload identify {found.loaded} --robot {options.robot} --tare {found.empty or options.tare}"
+            begun = "" if isinstance(error, SentError) else "nothing was written: "
+            failed = f"{begun}{error}; `{again}` tells the answer"
+            if interruption.name is not None:
+                print_note(failed)
+    if failed is not None:
+        raise SinkError(failed)
 
 
 def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion | None, loaded: bool) -> dict[str, Any]:

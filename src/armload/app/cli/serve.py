@@ -37,7 +37,8 @@ examples:
   armload serve sim --duration 20
 
 cell.toml names arms as [[arm]] tables; docs/service.md has an example. Options of this line take the place of what the
-file says of the service. Lines of JSON come on stdout, what happens on stderr. SIGTERM saves and ends it.
+file says of the service. Lines of JSON come on stdout, what happens on stderr. SIGTERM, or its terminal that is
+closed, saves and ends it.
 """
 
 
@@ -101,7 +102,11 @@ def run(options: argparse.Namespace) -> int | None:
     checked(settings)
     service, output = Service(settings, print_note), _Output(alarms_only=options.quiet)
     endpoint = None
-    signal.signal(signal.SIGTERM, lambda *_: threading.Thread(target=service.stop, daemon=True).start())
+    ends = [signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # else it is to outlive its terminal (nohup)
+        ends.append(signal.SIGHUP)
+    for number in ends:
+        signal.signal(number, lambda *_: threading.Thread(target=service.stop, daemon=True).start())
     try:
         with service.heard_by(output.put):
             if settings.port is not None:

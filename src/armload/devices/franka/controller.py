@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from armload.arms import Arm
 from armload.devices.counted import Counted
@@ -36,17 +37,14 @@ class FrankaController:
             SourceError: it does not answer.
         """
         status = self._connection().read_once()
-        inertia = np.reshape(status.inertia_load, (3, 3), order="F")
-        load = InertialParameters.zero(self._flange)
-        if status.m_load > 0.0:
-            load = InertialParameters.from_com(status.m_load, status.com_load, inertia, self._flange)
+        load = body_of(status.m_load, status.com_load, status.inertia_load, self._flange)
         return Counted(status.dq, status.m_ee, load)
 
     def put(self, load: Load) -> None:
         """Make it count a load, guarded; one of zero is nothing.
 
         Raises:
-            SinkError: the load must not be written, or the robot refused it.
+            SinkError: the load must not be written, or the robot refused it. SentError: it was sent, and may count.
         """
         robot = self._connection()
         set_load(robot, load, self._arm, write=True, allow_undetermined_inertia=True, allow_nothing=True)
@@ -59,5 +57,12 @@ class FrankaController:
 
     def _connection(self) -> Detached:
         if (robot := self._present()) is None:
-            raise SourceError("the robot is not connected")
+            raise SourceError("the robot is not connected: it is being opened again")
         return robot
+
+
+def body_of(mass: float, com: ArrayLike, inertia: ArrayLike, flange: str) -> InertialParameters:
+    """A load in the robot's own numbers: its centre (3,) [m] and inertia (9,), column by column [kg·m²]."""
+    if mass <= 0.0:
+        return InertialParameters.zero(flange)
+    return InertialParameters.from_com(mass, com, np.reshape(inertia, (3, 3), order="F"), flange)

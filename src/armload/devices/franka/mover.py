@@ -19,12 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.devices.counted import read_back
 from armload.devices.franka import writer
+from armload.devices.franka.controller import body_of
 from armload.devices.franka.source import FrankaSource, load_client
+from armload.devices.guard import flange_of
 from armload.devices.load import Load
 from armload.devices.mover import StreamedMover
 from armload.devices.supervision import Thresholds
 from armload.errors import SafetyError, SourceError, one_line
+from armload.inertia import InertialParameters
 from armload.motion import Motion
 from armload.recording import Sample
 
@@ -95,9 +99,21 @@ class FrankaMover(StreamedMover):
             ) from None
 
     def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
-        """Tell the controller the load, guarded (`writer.set_load`), and return the arguments."""
-        robot = self._source.robot
-        return writer.set_load(robot, load, self.arm, write=True, allow_undetermined_inertia=allow_undetermined_inertia)
+        """Tell the controller the load, guarded (`writer.set_load`), read it back, and return the arguments.
+
+        Raises:
+            SinkError: the load must not be written. SentError: it was sent, and the robot may count another one.
+        """
+        robot, allowed = self._source.robot, allow_undetermined_inertia
+        sent = writer.set_load(robot, load, self.arm, write=True, allow_undetermined_inertia=allowed)
+        flange = flange_of(self.arm)
+
+        def counted() -> InertialParameters:
+            status = self._source.read_once()
+            return body_of(status.m_load, status.com_load, status.inertia_load, flange)
+
+        read_back(body_of(*sent, flange), counted)
+        return sent
 
     def arrived(self) -> float | None:
         """When the client had the state handed on last."""

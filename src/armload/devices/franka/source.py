@@ -138,7 +138,10 @@ class FrankaSource(Source):
         try:
             return robot.read_once()
         except Exception as error:
-            raise SourceError(f"{self.name} was lost: {one_line(error)}") from None
+            raise SourceError(
+                f"{self.name} was lost ({one_line(error)}): see that the robot is switched on, its cable is in, and "
+                "FCI is activated in Desk"
+            ) from None
 
 
 @contextlib.contextmanager

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any, Protocol
 
 from armload.arms import Arm
 from armload.devices.franka.form import FrankaLoad, franka_load
 from armload.devices.guard import check_writable, stands_still
 from armload.devices.load import Load
-from armload.errors import SinkError, one_line
+from armload.errors import SentError, SinkError, one_line
 from armload.identification import Identification
 
 
@@ -44,7 +45,7 @@ def set_load(
         write, flange, allow_undetermined_inertia, allow_nothing: see `check_writable`.
 
     Raises:
-        SinkError: the load must not be written (see `check_writable`), or the robot refused it.
+        SinkError: the load must not be written (see `check_writable`). SentError: the robot refused it, or was lost.
     """
     try:
         end_effector = float(robot.read_once().m_ee)
@@ -66,5 +67,13 @@ def set_load(
     try:
         robot.set_load(*load)
     except Exception as error:
-        raise SinkError(f"the robot refused the load: {one_line(error)}") from error
+        raise SentError(_not_taken(robot, one_line(error))) from error
     return load
+
+
+def _not_taken(robot: FrankaClient, why: str) -> str:
+    """What to say of a load that was sent, and not confirmed."""
+    with contextlib.suppress(Exception):
+        robot.read_once()
+        return f"the robot refused the load: {why}; see in Desk what stops it, and which load it counts"
+    return f"the robot was lost while the load was sent ({why}): see in Desk which load it counts"

@@ -22,7 +22,7 @@ from armload.devices.mover import Movement, StreamedMover
 from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.source import Ros2Source
 from armload.devices.supervision import Thresholds
-from armload.errors import SafetyError
+from armload.errors import SafetyError, SourceError
 from armload.motion import Course, Motion
 from armload.recording import Sample
 
@@ -65,24 +65,71 @@ class Ros2Mover(StreamedMover):
         self._goal: NDArray[np.float64] | None = None
 
     def __iter__(self) -> Iterator[Sample]:
-        for sample in self._source:
-            if np.all(np.isfinite(sample.q)):
-                self._seen = sample.q
-            movement = self._took(sample, lambda at=sample.t: self._begins(at))
-            if movement is not None:
-                assert movement.begun is not None
-                t = sample.t - movement.begun + self._source.lag()
-                braked = movement.course.braked
-                self._brakes(movement, t + _LEAD)
-                if movement.course.braked != braked or t - self._sent >= _EVERY:
-                    self._send(movement.course, t)
+        return (sample for sample in self.ticking(None) if sample is not None)
+
+    def ticking(self, tick: float | None) -> Iterator[Sample | None]:
+        """See `Ros2Source.ticking`; the arm's commands go out as its samples come."""
+        for sample in self._source.ticking(tick):
+            if sample is not None:
+                self._command(sample)
             yield sample
+
+    def _command(self, sample: Sample) -> None:
+        """Send what is due now that this sample has come."""
+        if np.all(np.isfinite(sample.q)):
+            self._seen = sample.q
+        under_way = self._movement
+        movement = self._took(sample, lambda at=sample.t: self._begins(at))
+        if movement is not None:
+            assert movement.begun is not None
+            t = sample.t - movement.begun + self._source.lag()
+            braked = movement.course.braked
+            self._brakes(movement, t + _LEAD)
+            if movement.course.braked != braked or t - self._sent >= _EVERY:
+                self._send(movement.course, t)
+        elif under_way is not None and self.why is None:
+            self.why = self._left()
+
+    def _left(self) -> str | None:
+        """What is left to where a movement has ended, if that is more than a controller lets an arm hang."""
+        if self._goal is None or self._seen is None:
+            return None
+        away = np.abs(self._goal - self._seen)
+        j = int(np.argmax(away))
+        return None if away[j] < _SAME else f"{self.arm.joint_names[j]} is {away[j]:.3f} rad from its end ({self._see})"
+
+    @property
+    def _see(self) -> str:
+        """What to look at where the arm does not follow: a topic brings no refusal."""
+        return f"see that the controller of {self._commands} is active, and whether it refuses what it is sent"
+
+    def silence(self, seconds: float) -> str:
+        """What to say where no sample came for so many seconds while the arm was on its way."""
+        return f"{self._source.silence(seconds)}; the arm was on its way, and its controller lets it come to rest there"
 
     def commanded(self) -> NDArray[np.float64]:
         """Where it was sent last, q (n,) [rad]; where it is, if that is elsewhere or nobody sent it."""
-        assert self._seen is not None
+        if self._seen is None:
+            self._seen = self._first_seen()
         near = self._goal is not None and np.abs(self._goal - self._seen).max() < _SAME
         return np.array(self._goal if near else self._seen)
+
+    def _first_seen(self) -> NDArray[np.float64]:
+        """Where the arm is, before its samples are asked for.
+
+        Raises:
+            SourceError: none of them says so for some seconds.
+        """
+        until = time.monotonic() + _TO_DISCOVER
+        for sample in self._source:
+            if np.all(np.isfinite(sample.q)):
+                return sample.q
+            if time.monotonic() > until:
+                break
+        raise SourceError(
+            f"{self.name} has had no position of every joint for {_TO_DISCOVER:g} s: expected finite numbers; see what "
+            "its driver publishes"
+        )
 
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement, a moment after the next sample."""
@@ -95,6 +142,8 @@ class Ros2Mover(StreamedMover):
                 )
             self._connection.spin(_LEAD)
         super().follow(motion, thresholds)
+        assert self._movement is not None
+        self._movement.supervision.off = self._see
         self._goal = motion.position([motion.duration])[0]
 
     def arrived(self) -> float | None:

@@ -82,11 +82,19 @@ class Ros2Source(Source):
         Raises:
             SourceError: nothing was heard for `timeout` seconds, or the first message lacks efforts.
         """
+        return (sample for sample in self.ticking(None) if sample is not None)
+
+    def ticking(self, tick: float | None) -> Iterator[Sample | None]:
+        """The same, and None whenever none has come for `tick` seconds; tick None: never."""
+        since = time.monotonic()
         while not self._closed:
-            heard = self._next()
+            heard = self._next(since, tick)
             if heard is not None:
                 sample, self._arrived = heard
                 yield sample
+                since = time.monotonic()
+            elif not self._closed:
+                yield None
 
     def arrived(self) -> float | None:
         """When the middleware had taken in the message handed on last."""
@@ -104,9 +112,12 @@ class Ros2Source(Source):
     def _receive(self, message: Any, received: int) -> None:
         self._received.append((message, received))
 
-    def _next(self) -> tuple[Sample, float] | None:
-        """The next sample of the arm and when it arrived, on the monotonic clock [s]; None: closed meanwhile."""
-        heard = time.monotonic()
+    def _next(self, since: float, tick: float | None = None) -> tuple[Sample, float] | None:
+        """The next sample of the arm and when it arrived, on the monotonic clock [s].
+
+        None: closed meanwhile, or none came within `tick` [s]. since: when the one before had been dealt with.
+        """
+        heard, asked = since, time.monotonic()
         while not self._closed:
             while self._received and not self._ready:
                 message, received = self._received.popleft()
@@ -121,8 +132,11 @@ class Ros2Source(Source):
             if self._ready:
                 return self._ready.popleft()
             if self._timeout is not None and silent > self._timeout:
-                raise SourceError(self._silence())
-            self.connection.spin(_LOOK)
+                raise SourceError(self.silence(self._timeout))
+            waited = time.monotonic() - asked
+            if tick is not None and waited > tick:
+                return None
+            self.connection.spin(_LOOK if tick is None else min(_LOOK, max(0.0, tick - waited)))
         return None
 
     def _told(self, sample: Sample, arrived: float) -> list[tuple[Sample, float]]:
@@ -138,7 +152,7 @@ class Ros2Source(Source):
     def _measured_rate(self) -> float:
         first = []
         while len(first) < _TO_TELL_THE_RATE:
-            heard = self._next()
+            heard = self._next(time.monotonic())
             assert heard is not None  # nobody can close what is still being opened
             first.append(heard)
         self._ready.extendleft(reversed(first))
@@ -154,16 +168,17 @@ class Ros2Source(Source):
                 f"{least:.0f} samples a second, from whose positions they can be told"
             )
 
-    def _silence(self) -> str:
+    def silence(self, seconds: float) -> str:
+        """What to say where no sample of the arm came for so many seconds."""
         missing = [name for name in self._arm.joint_names if name not in self._states.others]
         if not self._states.others:
             return (
-                f"no joint states on {self.name} for {self._timeout:g} s: expected a publisher of "
+                f"no joint states on {self.name} for {seconds:g} s: expected a publisher of "
                 "sensor_msgs/JointState; check the topic's name, ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE"
             )
         found = ", ".join(sorted(self._states.others)[:20])
         lacking = f"without {', '.join(missing)}" if missing else "that never come in one message"
         return (
-            f"{self.name} had only the joints {found} for {self._timeout:g} s, {lacking}: expected all of "
+            f"{self.name} had only the joints {found} for {seconds:g} s, {lacking}: expected all of "
             f"{self._arm.name}'s; name the right robot or topic"
         )

@@ -21,8 +21,9 @@ from armload.devices.load import Load
 from armload.devices.mover import StreamedMover
 from armload.devices.supervision import Thresholds
 from armload.devices.ur import writer
+from armload.devices.ur.controller import URController
 from armload.devices.ur.source import URSource, load_control
-from armload.errors import ArmloadError, SafetyError, SourceError, one_line
+from armload.errors import ArmloadError, SafetyError, SinkError, SourceError, one_line
 from armload.motion import Motion
 from armload.recording import Sample
 
@@ -83,23 +84,18 @@ class URMover(StreamedMover):
             ) from None
 
     def write(self, load: Load, *, allow_undetermined_inertia: bool = False) -> Any:
-        """Tell the controller the load, guarded (`writer.set_load`), and return the arguments.
+        """Tell the controller the load, guarded (`writer.set_load`), read it back, and return the arguments.
 
         Raises:
-            SinkError: the load must not be written, or the robot refused it.
+            SinkError: the load must not be written. SentError: it was sent, and the robot may count another one.
         """
-        control = writer.taken_control(load_control(), self._address)
+        controller = URController(self._address, self.arm)
         try:
-            return writer.set_load(
-                control,
-                self._source.client,
-                load,
-                self.arm,
-                write=True,
-                allow_undetermined_inertia=allow_undetermined_inertia,
-            )
+            return controller.put_and_read_back(load, allow_undetermined_inertia=allow_undetermined_inertia)
+        except SourceError as error:
+            raise SinkError(str(error)) from None
         finally:
-            writer.ended_control(control, self._address)
+            controller.close()
 
     def arrived(self) -> float | None:
         """When the client had the values handed on last."""

@@ -29,6 +29,7 @@ from armload.runtime.extras import install
 _FIELDS = ["timestamp", "actual_q", "actual_qd", "actual_current"]
 _LOOK = 2e-4  # [s] between two looks for the next sample
 _SILENCE = 1.0  # [s] after which the arm counts as lost
+_SEE = "see that the robot is switched on, its cable is in, and RTDE is enabled in its security settings"
 
 
 class URSource(Source):
@@ -82,10 +83,11 @@ class URSource(Source):
         while not self._stop.is_set():
             t = client.getTimestamp()
             if t == last:
+                silent = time.monotonic() - heard
                 if not client.isConnected():
-                    raise SourceError(f"{self.name} was lost: the connection was closed")
-                if time.monotonic() - heard > _SILENCE:
-                    raise SourceError(f"{self.name} was lost: no sample for {time.monotonic() - heard:.1f} s")
+                    raise SourceError(f"{self.name} was lost: it closed the connection; {_SEE}")
+                if silent > _SILENCE:
+                    raise SourceError(f"{self.name} was lost: no sample for {silent:.1f} s; {_SEE}")
                 self._stop.wait(_LOOK)
                 continue
             heard = time.monotonic()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
@@ -10,7 +11,7 @@ from armload.arms import Arm
 from armload.devices.guard import check_writable, stands_still
 from armload.devices.load import Load
 from armload.devices.ur.form import URPayload, ur_payload
-from armload.errors import SinkError, one_line
+from armload.errors import SentError, SinkError, one_line
 from armload.identification import Identification
 
 
@@ -87,19 +88,13 @@ def set_load(
         write, flange, allow_undetermined_inertia, allow_nothing: see `check_writable`.
 
     Raises:
-        SinkError: the load must not be written (see `check_writable`), or the robot refused it.
+        SinkError: the load must not be written (see `check_writable`). SentError: the robot refused it, or was lost.
     """
-    try:
-        if not receive.isConnected():  # the client would go on giving its last values
-            raise ConnectionError("the connection is lost")
-        moving = not stands_still(receive.getActualQd)
-    except Exception as error:  # the vendor's own exceptions have no common base
-        raise SinkError(f"the robot's state cannot be read, so no payload is written: {one_line(error)}") from error
     payload = ur_payload(
         check_writable(
             result,
             arm,
-            moving=moving,
+            moving=moves(receive),
             write=write,
             flange=flange,
             allow_undetermined_inertia=allow_undetermined_inertia,
@@ -109,7 +104,31 @@ def set_load(
     try:
         taken = control.setTargetPayload(*payload)
     except Exception as error:
-        raise SinkError(f"the robot refused the payload: {one_line(error)}") from error
+        raise SentError(_not_taken(receive, one_line(error))) from error
     if taken is False:
-        raise SinkError("the robot refused the payload: setTargetPayload returned False")
+        raise SentError(_not_taken(receive, "setTargetPayload returned False"))
     return payload
+
+
+def moves(receive: URReceive) -> bool:
+    """Whether the arm moves, within a tenth of a second.
+
+    Raises:
+        SinkError: nobody can say.
+    """
+    try:
+        if not receive.isConnected():  # the client would go on giving its last values
+            raise ConnectionError("the connection is lost")
+        return not stands_still(receive.getActualQd)
+    except Exception as error:  # the vendor's own exceptions have no common base
+        raise SinkError(f"the robot's state cannot be read, so no payload is written: {one_line(error)}") from error
+
+
+def _not_taken(receive: URReceive, why: str) -> str:
+    """What to say of a payload that was sent, and not confirmed."""
+    with contextlib.suppress(Exception):
+        if receive.isConnected():
+            return (
+                f"the robot refused the payload: {why}; see on its pendant what stops it, and which payload it counts"
+            )
+    return f"the robot was lost while the payload was sent ({why}): see on its pendant which payload it counts"
