@@ -110,6 +110,20 @@ def lacking(
     return notes
 
 
+def without_mass(arm: Arm) -> list[str]:
+    """That the description leaves out what some links weigh, which then counts as payload.
+
+    But for what the first joint moves: it turns about the vertical, or slides, and bears no weight.
+    """
+    joints = [name for name, phi in zip(arm.joint_names[1:], arm.link_parameters[1:], strict=True) if phi[0] == 0.0]
+    if not joints:
+        return []
+    return [
+        f"the description of {arm.name} gives no mass to what {', '.join(joints)} move{'s' * (len(joints) == 1)}: what "
+        "that weighs counts as payload; complete the description, or record a tare"
+    ]
+
+
 def another_model(name: str, links: float) -> str:
     """That the links seem to be those of another model."""
     return (
