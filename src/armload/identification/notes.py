@@ -185,6 +185,7 @@ def gravity_turned(given: ArrayLike, found: ArrayLike, answered: bool) -> str:
         f"the base leans by {angle:.1f}° against the gravity that was given: "
         + ("this is the answer for" if answered else "answer anew with")
         + f" --gravity={option}, as the torques show it; level the base, or give its gravity"
+        + ("; joints in another order look so, too" if angle > 10.0 else "")
     )
 
 

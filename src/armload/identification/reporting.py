@@ -155,7 +155,7 @@ def removal(relative_to: str) -> str:
     if relative_to == "before":
         return "something was taken off that was on the arm from the start: no body has these parameters"
     less = "less is mounted than the model of the arm and its tool assume"
-    return f"the mass is negative: {less}, or the torque's sign is turned"
+    return f"the mass is negative: {less}, the torque's sign is turned, or the joints are in another order"
 
 
 def exchanged_since(relative_to: str) -> str:
