@@ -164,11 +164,11 @@ def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "ta
         )
     if drift is None or not drift.changed:
         return None
-    j, allow = drift.joint, "allow" if drift.allowed else "do not allow"
+    j, allow = drift.joint, "allow for it, but not for another arm's links" if drift.allowed else "do not allow for it"
     offset, friction = (f"{x:+.2g} N·m" if abs(x) >= 5e-4 else "nothing" for x in (drift.offset[j], drift.coulomb[j]))
     return (
         f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {offset}, the friction by "
-        f"{friction}; the intervals {allow} for it; record a tare of this arm as it is now, with the same base and tool"
+        f"{friction}; the intervals {allow}; record a tare of this arm as it is now, with the same base and tool"
     )
 
 
