@@ -6,7 +6,7 @@ import importlib
 import pytest
 
 from armload.app.cli.arguments import attach_values, centre, gravity, weighed
-from armload.app.cli.entry import COMMANDS
+from armload.app.cli.entry import COMMANDS, main
 from armload.app.cli.motion_arguments import box, floor, numbers
 
 OF_NUMBERS = (box, centre, floor, gravity, numbers, weighed)
@@ -42,3 +42,11 @@ def test_a_pose_may_begin_with_a_negative_angle():
 def test_what_is_no_height_is_refused(height):
     with pytest.raises(argparse.ArgumentTypeError, match="not a height"):
         floor(height)
+
+
+@pytest.mark.parametrize("names", ["anything", "nothing", "tool and payload", "wide,nothing", "Wide", ""])
+def test_a_family_is_a_kind_of_payload_that_somebody_may_know(names, capsys):
+    assert main(["identify", "run.csv", "--robot", "panda", f"--family={names}"]) == 2
+    said = capsys.readouterr().err
+    assert "expected some of boxes, shapes, tools, container, wide, light" in said
+    assert "anything, " not in said  # a part of the learned prior, and no kind of payload

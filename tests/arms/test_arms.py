@@ -714,6 +714,12 @@ def test_an_arm_loads_from_a_urdf_file(tmp_path, panda):
 ONE_LINK = robot(link("base"), joint("j", "revolute", "base", "a"), link("a", 1.0))
 
 
+@pytest.mark.parametrize(("name", "meant"), [("UR5e", "ur5e"), ("FR3", "fr3"), ("iiwa-14", "iiwa14")])
+def test_a_built_in_arm_that_is_written_otherwise_is_asked_about(name, meant):
+    with pytest.raises(ArmError, match=f"unknown robot '{name}'.*did you mean '{meant}'"):
+        arm(name)
+
+
 @pytest.mark.parametrize(
     ("attempt", "says"),
     [

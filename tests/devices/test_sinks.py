@@ -35,6 +35,7 @@ from armload.devices.load_remarks import HARDLY_KNOWN
 from armload.devices.ur import writer as ur_robot
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
 from armload.identification import Identification
+from armload.identification.answer import Segment
 from armload.identification.intervals import intervals
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import INERTIA_ASSUMED, franka_hand, hand_on, random_payload, test_payload, write_payload
@@ -450,6 +451,18 @@ def test_a_text_says_that_its_intervals_are_approximate_and_that_nothing_seems_t
             assert ("approximate, not calibrated" in text) == (interval == "approximate")
             assert ("nothing seems to be held" in text) == (body is light)
             assert "nothing seems" not in export_load(load + franka_hand().parameters, form)
+
+
+@pytest.mark.parametrize("form", [name for name in FORMS if name != "franka-desk"])
+def test_a_text_says_that_the_payload_changed_within_its_log(form, tmp_path):
+    path, one = tmp_path / "held.json", identification(skew_body())
+    first, last = Segment(0.0, 3.0, one), Segment(3.0, 6.0, one)
+    for segments in ((last,), (first, last)):
+        result = replace(one, segments=segments)
+        path.write_text(json.dumps(result.to_dict()))
+        for load in (Load.of(result), read_load(path)):
+            said = "the payload changed within the log: this is the last of 2, held at the end"
+            assert (said in export_load(load, form)) == (len(segments) == 2)
 
 
 @pytest.mark.parametrize("form", ["urdf", "mjcf", "sdf"])

@@ -10,11 +10,14 @@ import armload
 from armload import HybridIdentifier, OnlineIdentifier, arm, write_recording
 from armload.identification import identify
 from armload.identification.intervals import intervals
+from armload.identification.notes import arm_changed, gravity_turned
+from armload.identification.reporting import removal
 from armload.identification.thresholds import FARTHEST
 from armload.inertia import NAMES, Z95, InertialParameters, com_interval, inertia_com_std, phi_to_com, vech
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024
 from armload.payloads import Payload, write_payload
+from armload.posterior.scales import Drift
 from armload.recording import Recording
 from armload.simulation import Sensors, World, simulate
 
@@ -294,3 +297,17 @@ def test_a_method_that_was_named_is_not_explained(panda, loaded, plain):
         text = " ".join([str(answer), *answer.notes])
         assert "asked for" not in text
         assert "holds for any motion" not in text
+
+
+def test_of_what_joints_in_another_order_look_like_that_is_said():
+    level = (0.0, 0.0, -9.81)
+    assert "joints in another order" in gravity_turned(level, (1.51, 4.19, -8.74), True)  # by 27°
+    assert "another order" not in gravity_turned(level, (0.51, 0.0, -9.8), True)  # by 3°
+    assert "joints are in another order" in removal("arm")
+    assert "another order" not in removal("tare")
+
+
+def test_of_an_arm_that_changed_it_is_said_what_the_intervals_do_not_allow_for():
+    drift = Drift(np.full(7, 0.1), np.zeros(7), 40.0, 0, True)
+    assert "the intervals allow for it, but not for another arm's links" in (arm_changed(drift, None) or "")
+    assert "another arm" not in (arm_changed(replace(drift, allowed=False), None) or "another arm")

@@ -219,6 +219,15 @@ def test_only_measured_torque_at_a_useful_rate_is_taken(panda, analytic_log):
         identify(log, panda, method="hybird")
 
 
+def test_a_log_at_the_lowest_rate_is_taken_whatever_its_clock(panda, analytic_log):
+    log = analytic_log(panda, BOX)
+    slow = log.select(slice(None, None, round(log.rate / 20.0)))
+    for t in (slow.t * 1.001, 1.7e9 + slow.t, slow.t):
+        identify(replace(slow, t=t), panda, method="map")
+    with pytest.raises(IdentificationError, match=r"sampled at 18\.2 Hz: expected at least 20 Hz"):
+        identify(replace(slow, t=slow.t * 1.1), panda, method="map")
+
+
 def test_a_tool_mounted_after_the_tare_is_taken_off_the_answer(panda, simulated):
     for mounted, seed, relative_to, said in (
         ("nothing", 4, "tool", "after the tare"),

@@ -47,3 +47,14 @@ def test_a_hybrid_that_is_asked_for_by_name_is_refused_with_what_there_is(tmp_pa
     log = simulate(robot, excitation(arm("xarm7")), rate=250.0)
     with pytest.raises(ArmloadError, match=r"no hybrid is shipped.*train"):
         identify(log, robot, method="hybrid")
+
+
+def test_of_a_link_without_mass_it_is_said_that_its_weight_counts_as_payload(tmp_path):
+    sound = arm("ur5e")
+    urdf = re.sub(r'(<link name="forearm_link">)\s*<inertial>.*?</inertial>', r"\1", sound.urdf, flags=re.DOTALL)
+    (tmp_path / "gap.urdf").write_text(urdf)
+    robot = arm(tmp_path / "gap.urdf", "tool0")
+    log, tare = (simulate(sound, random_motion(sound, seed), rate=100.0, seed=seed) for seed in (1, 2))
+    said = "gives no mass to what elbow_joint moves: what that weighs counts as payload"
+    for answer, notes in ((identify(log, robot), 1), (identify(log, robot, tare=tare), 0), (identify(log, sound), 0)):
+        assert sum(said in note for note in answer.notes) == notes

@@ -151,6 +151,22 @@ def test_a_payload_file_that_is_not_there_or_not_text_says_so(tmp_path):
         write_payload(tmp_path / "no" / "p.json", franka_hand())
 
 
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("part.stl", '"mesh": "part.stl"'),
+        ("Part.STL", '"mesh": "Part.STL"'),
+        ("part.step", r'save it as a mesh .*"mesh": "part.stl"'),
+    ],
+)
+def test_a_drawing_in_the_place_of_a_payload_file_says_how_to_name_it_in_one(tmp_path, name, says):
+    drawing = tmp_path / name
+    drawing.write_bytes(b"solid part \xff\xfe")
+    with pytest.raises(PayloadError, match=f"is a drawing.*{says}") as caught:
+        read_payload(drawing)
+    assert "\n" not in str(caught.value)
+
+
 def test_what_a_link_points_to_is_replaced_and_the_link_stays(tmp_path):
     (tmp_path / "there").mkdir()
     target, far, link = tmp_path / "there" / "p.json", tmp_path / "far.json", tmp_path / "link.json"

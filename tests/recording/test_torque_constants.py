@@ -7,6 +7,7 @@ from armload.arms import arm
 from armload.errors import RecordingError
 from armload.motion import excitation
 from armload.recording import read_recording
+from armload.recording.currents import no_constants
 from armload.simulation import simulate
 
 UR = arm("ur5e")  # whose sheet has no constants
@@ -70,3 +71,8 @@ def test_without_them_the_sentence_says_what_to_log(tmp_path, log):
     )
     with pytest.raises(RecordingError, match=r"known for ur5e: log target_moment and target_current as well"):
         read_recording(tmp_path / "run.csv", UR)
+
+
+def test_as_many_constants_are_asked_for_as_the_arm_has_joints(panda):
+    assert "give 7 numbers in N·m/A" in str(no_constants("run.csv", "these look like", panda, panda.n))
+    assert '"torque_constants=K1 … K7"' in str(no_constants("run.csv", "these look like", panda, panda.n))

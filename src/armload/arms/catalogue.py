@@ -46,9 +46,11 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
             raise ArmError(f"robot description {name} is a folder: expected the path of a URDF file")
         if path.suffix or len(path.parts) > 1:
             raise ArmError(f"robot description {name} is not there: expected the path of a URDF file that exists")
+        plain = "".join(letter for letter in name.lower() if letter.isalnum())
         raise ArmError(
             f"unknown robot {name!r}: expected one of {', '.join(ARMS)}, or the path of a URDF file that exists, with "
             "masses and inertias of its links, as its maker or its ROS package gives it"
+            + (f"; did you mean {plain!r}?" if plain in ARMS else "")
         )
     try:
         text = path.read_text(encoding="utf-8")

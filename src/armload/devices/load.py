@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.devices.load_remarks import NOTHING_HELD, assumed, doubted, leaning, loose, without_moments
+from armload.devices.load_remarks import NOTHING_HELD, assumed, doubted, leaning, loose, of_a_part, without_moments
 from armload.errors import SinkError
 from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
@@ -74,7 +74,8 @@ class Load:
         std = (result.phi_high - result.phi_low) / (2 * Z95)
         known, resting = tuple(result.determined.tolist()), result.rests_on_prior.tolist()
         inertia = (result.inertia_com, result.inertia_com_low, result.inertia_com_high)
-        remarks = doubted(result.interval) + leaning(known, resting) + loose(*map(np.diag, inertia), known=known)
+        remarks = doubted(result.interval) + of_a_part(result.segments) + leaning(known, resting)
+        remarks += loose(*map(np.diag, inertia), known=known)
         return cls(result.parameters, known, result.robot, result.relative_to, std, remarks)
 
     @property
@@ -240,7 +241,8 @@ def read_load(path: str | Path) -> Load:
     except (KeyError, TypeError, ValueError, OverflowError):
         pass  # written by hand: the numbers themselves are enough
     resting = _flags(content, "rests_on_prior", path) or (False,) * 10
-    remarks = doubted(content.get("interval")) + leaning(determined, resting) + assumed(payload)
+    remarks = doubted(content.get("interval")) + of_a_part(content.get("segments"))
+    remarks += leaning(determined, resting) + assumed(payload)
     try:
         inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
         remarks += loose(*(np.diag(np.array(x, dtype=float)) for x in inertia), known=determined)

@@ -43,6 +43,13 @@ def doubted(interval: Any) -> tuple[str, ...]:
     return (_APPROXIMATE,) if interval == "approximate" else ()
 
 
+def of_a_part(parts: Any) -> tuple[str, ...]:
+    """A remark on what was held at the end of a log only. parts: of the log, with a payload each."""
+    if not isinstance(parts, list | tuple) or len(parts) < 2:
+        return ()
+    return (f"the payload changed within the log: this is the last of {len(parts)}, held at the end",)
+
+
 def leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple[str, ...]:
     """A remark on parameters that the log determines, though less than what payloads are usually like does."""
     names = [n for n, known, prior in zip(NAMES, determined, rests_on_prior, strict=True) if known and prior]

@@ -225,7 +225,7 @@ def check_usable(log: Recording, arm: Arm) -> None:
         raise IdentificationError(
             f"{log.source} holds {log.channel} torque: expected measured joint torque with gravity in it"
         )
-    if log.rate < LOWEST_RATE:
+    if round(log.rate) < LOWEST_RATE:  # in whole numbers: times since 1970 are rounded, and clocks run slow
         raise IdentificationError(
             f"{log.source} is sampled at {log.rate:.3g} Hz: expected at least {LOWEST_RATE:g} Hz; record faster, as "
             "what lies between two samples is not to be had afterwards"

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from armload.posterior import Known
 
 _BETWEEN = re.compile("±|\\+/?-")  # a value and its standard deviation
+# what somebody may know of a payload; the learned prior has parts beside them that are nobody's knowledge
+FAMILIES = ("boxes", "shapes", "tools", "container", "wide", "light")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,5 +97,17 @@ def families(text: str | None) -> tuple[str, ...]:
 
     >>> families("wide, boxes"), families(None)
     (('wide', 'boxes'), ())
+
+    Raises:
+        IdentificationError: no family is called so.
     """
-    return () if not text else tuple(name.strip() for name in text.split(","))
+    if text is None:
+        return ()
+    names = tuple(name.strip() for name in text.split(","))
+    stray = sorted(set(names) - set(FAMILIES))
+    if stray:
+        raise IdentificationError(
+            f"no family is called {', '.join(stray) if all(stray) else repr(text)}: expected some of "
+            f"{', '.join(FAMILIES)}, separated by commas; where none is known, leave it out"
+        )
+    return names

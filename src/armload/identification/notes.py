@@ -110,6 +110,20 @@ def lacking(
     return notes
 
 
+def without_mass(arm: Arm) -> list[str]:
+    """That the description leaves out what some links weigh, which then counts as payload.
+
+    But for what the first joint moves: it turns about the vertical, or slides, and bears no weight.
+    """
+    joints = [name for name, phi in zip(arm.joint_names[1:], arm.link_parameters[1:], strict=True) if phi[0] == 0.0]
+    if not joints:
+        return []
+    return [
+        f"the description of {arm.name} gives no mass to what {', '.join(joints)} move{'s' * (len(joints) == 1)}: what "
+        "that weighs counts as payload; complete the description, or record a tare"
+    ]
+
+
 def another_model(name: str, links: float) -> str:
     """That the links seem to be those of another model."""
     return (
@@ -150,11 +164,11 @@ def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "ta
         )
     if drift is None or not drift.changed:
         return None
-    j, allow = drift.joint, "allow" if drift.allowed else "do not allow"
+    j, allow = drift.joint, "allow for it, but not for another arm's links" if drift.allowed else "do not allow for it"
     offset, friction = (f"{x:+.2g} N·m" if abs(x) >= 5e-4 else "nothing" for x in (drift.offset[j], drift.coulomb[j]))
     return (
         f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {offset}, the friction by "
-        f"{friction}; the intervals {allow} for it; record a tare of this arm as it is now, with the same base and tool"
+        f"{friction}; the intervals {allow}; record a tare of this arm as it is now, with the same base and tool"
     )
 
 
@@ -171,6 +185,7 @@ def gravity_turned(given: ArrayLike, found: ArrayLike, answered: bool) -> str:
         f"the base leans by {angle:.1f}° against the gravity that was given: "
         + ("this is the answer for" if answered else "answer anew with")
         + f" --gravity={option}, as the torques show it; level the base, or give its gravity"
+        + ("; joints in another order look so, too" if angle > 10.0 else "")
     )
 
 

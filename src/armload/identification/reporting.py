@@ -24,6 +24,7 @@ from armload.identification.notes import (
     leaning_on_prior,
     less_than_nothing,
     not_rigid,
+    without_mass,
 )
 from armload.inertia import HELD, Z95, InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
@@ -64,7 +65,7 @@ def answered(
         low, high = _with_any_inertia(low, high, unsure)
     found_of = intervals(phi, low, high, estimate.covariance, otherwise)
     doubts = _doubts(found, arm, determined[0], relative_to)
-    every_note = [*doubts, *notes]
+    every_note = [*doubts, *notes, *([] if tared else without_mass(arm))]
     mass_std = float(estimate.std[0])
     if determined[0] and -HELD * mass_std <= estimate.phi[0] < -Z95 * mass_std:
         every_note.append(less_than_nothing(float(estimate.phi[0]), mass_std, relative_to))
@@ -154,7 +155,7 @@ def removal(relative_to: str) -> str:
     if relative_to == "before":
         return "something was taken off that was on the arm from the start: no body has these parameters"
     less = "less is mounted than the model of the arm and its tool assume"
-    return f"the mass is negative: {less}, or the torque's sign is turned"
+    return f"the mass is negative: {less}, the torque's sign is turned, or the joints are in another order"
 
 
 def exchanged_since(relative_to: str) -> str:

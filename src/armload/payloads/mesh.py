@@ -13,6 +13,8 @@ from armload.payloads.payload import Payload
 from armload.payloads.solids import mass_of, placed, positive
 
 _LONGEST = 5.0  # [m] a part longer than this was drawn in millimetres or inches
+_MESHES = (".stl", ".obj", ".ply", ".off", ".3mf", ".glb", ".gltf", ".dae")
+_SOLIDS = (".step", ".stp", ".iges", ".igs", ".sldprt", ".ipt", ".f3d", ".fcstd", ".dxf")  # no triangles
 
 
 def from_mesh(
@@ -58,6 +60,23 @@ def from_mesh(
     unit = np.asarray(mesh.moment_inertia) * scale**5 / volume  # inertia about the CoM per kilogram [m²]
     about_mesh = InertialParameters.from_com(m, np.asarray(mesh.center_mass) * scale, m * 0.5 * (unit + unit.T))
     return Payload(name or path.stem, placed(about_mesh, rotation, translation))
+
+
+def require_no_drawing(path: Path) -> None:
+    """Say how a drawing becomes a payload file, where one was given in its place.
+
+    Raises:
+        PayloadError: by its suffix it is one.
+    """
+    ending = path.suffix.lower()
+    if ending in (*_MESHES, *_SOLIDS):
+        mesh = path.name if ending in _MESHES else f"{path.stem}.stl"
+        first = "" if ending in _MESHES else f"save it as a mesh ({mesh}), and "
+        raise PayloadError(
+            f"{path} is a drawing: expected a payload file that names its mesh; {first}write beside it a file such as "
+            f'{path.stem}.json: {{"mesh": "{mesh}", "scale": 0.001, "mass": 0.4, "frame": "tool0"}}, its mass in kg, '
+            "scale in metres per unit of the mesh"
+        )
 
 
 def _closed_mesh(path: Path):

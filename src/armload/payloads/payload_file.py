@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from armload.errors import ArmloadError, PayloadError
 from armload.inertia import NAMES, InertialParameters
-from armload.payloads.mesh import from_mesh
+from armload.payloads.mesh import from_mesh, require_no_drawing
 from armload.payloads.payload import Box, Payload, require_consistent
 from armload.payloads.uncertainty import Uncertainty
 from armload.runtime.atomic import replacing
@@ -51,8 +51,7 @@ def read_payload(path: str | Path) -> Payload:
     """The payload in a JSON file: one of `write_payload`, written by hand, or a saved result of `armload identify`.
 
     Raises:
-        PayloadError: the file is missing or not JSON, lacks the parameters, gives them twice and differently, or holds
-            parameters that no body can have.
+        PayloadError: the file is missing or no JSON, lacks parameters, contradicts itself, or is of no possible body.
     """
     return payload_from(read_content(path), path)
 
@@ -172,6 +171,7 @@ def read_content(path: str | Path) -> dict[str, Any]:
         PayloadError: the file is missing, or holds no JSON object.
     """
     path = Path(path)
+    require_no_drawing(path)
     if path.is_dir():
         raise PayloadError(f"payload file {path} is a folder: expected a JSON file")
     try:

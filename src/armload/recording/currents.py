@@ -12,8 +12,6 @@ from armload.errors import RecordingError
 from armload.recording.aliases import QUANTITIES, UNITS
 from armload.recording.column_spec import ColumnSpec
 
-_SAY = '--columns "torque_constants=12 12 10 11 11 11"'
-
 
 def of_currents(where: str, constants: Sequence[float], by: str = "") -> str:
     """A note of what the torque was made of; `by`: where the constants come from."""
@@ -39,7 +37,8 @@ def no_constants(where: str, what: str, arm: Arm | None, n: int, instead: str = 
     called = "this arm" if arm is None else arm.name
     return RecordingError(
         f"{where}: {what} motor currents [A], and no torque constants are known for {called}: {instead}give {n} "
-        f"numbers in N·m/A, from a scale test with a known load, with {_SAY}"
+        "numbers in N·m/A, from a scale test with a known load, with "
+        f'--columns "torque_constants=K1 … K{n}"'
     )
 
 

@@ -43,7 +43,7 @@ def controller_constants(
             f"{where}: the torque per motor current of joint(s) {', '.join(map(str, unknown))} does not follow from "
             "target_moment and target_current: expected them to lie on one line, over moments that differ; log while "
             "every joint moves, or give the constants, which a note lists where another log of this arm tells them, "
-            'with --columns "torque_constants=12 12 10 11 11 11"'
+            f'with --columns "torque_constants=K1 … K{len(found)}"'
         )
     return 1.0 / np.array(found, dtype=float)
 

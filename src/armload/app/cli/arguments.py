@@ -166,9 +166,9 @@ def centre(text: str) -> tuple[tuple[float, ...], float]:
 
 
 def _families(text: str) -> tuple[str, ...]:
-    from armload.identification.known_options import families
+    from armload.identification import known_options
 
-    return families(text)
+    return _understood(known_options.families, text)
 
 
 def _understood(read: Callable[[str], T], text: str) -> T:
@@ -221,7 +221,7 @@ def add_known_arguments(parser: argparse.ArgumentParser) -> None:
         type=_families,
         default=(),
         metavar="NAME,...",
-        help="what kind it is of: boxes, shapes, tools, container or wide (trays, bars, rings), or several",
+        help="what kind it is of: boxes, shapes, tools, container, wide (trays, bars, rings), light, or several",
     )
 
 
