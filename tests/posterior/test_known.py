@@ -12,6 +12,7 @@ from armload import arm, identify
 from armload.app.cli import main
 from armload.app.cli.arguments import centre
 from armload.errors import IdentificationError, ModelError
+from armload.identification import known_of
 from armload.identification.known_payload import denied_by
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
@@ -417,3 +418,10 @@ def test_a_centre_is_read_as_it_is_typed():
 def test_what_is_known_in_another_form_is_refused_in_a_sentence(mass, com):
     with pytest.raises(IdentificationError, match="expected two things"):
         Known.of(mass, com)
+
+
+def test_a_body_whose_inertia_is_zero_is_asked_for_it(panda):
+    point = InertialParameters.from_com(0.6, COM, np.zeros((3, 3)), "panda_link8")
+    body = Payload("point", point, uncertainty=Uncertainty(0.01, 0.002, 0.1))
+    with pytest.raises(IdentificationError, match=r"body point .* expected its inertia"):
+        known_of(panda, None, None, body)

@@ -118,7 +118,8 @@ def known_of(
         std = body.uncertainty
         if not body.parameters.mass > 0.0:
             raise IdentificationError(f"the body {body.name} has no mass: expected one above 0 kg")
-        if not body.inertia_known or min(std.mass, std.com, std.inertia) <= 0.0:
+        drawn_inertia = body.inertia_known and np.trace(body.parameters.inertia_com) > 0.0  # its error is a share of it
+        if not drawn_inertia or min(std.mass, std.com, std.inertia) <= 0.0:
             raise IdentificationError(
                 f"the body {body.name} is to be weighed against the log: expected its inertia, and how well it is "
                 'known, such as "std": {"mass": 0.01, "com": 0.002, "inertia": 0.1}'
