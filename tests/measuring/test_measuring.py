@@ -114,6 +114,24 @@ def test_without_consent_nothing_moves_and_nothing_is_made(panda, simulated, tmp
     assert not folder.exists()
 
 
+def test_who_does_not_agree_once_the_payload_is_on_is_not_told_that_nothing_was_moved_at_all(
+    panda, simulated, tmp_path
+):
+    mover, orders = simulated(), Orders()
+
+    def mount():
+        orders.mount(mover)()
+        orders.agrees = False
+        mover.follow(PointToPoint([START, NEAR], [0.0], [1.0]))  # somebody moves the arm elsewhere
+        for _ in zip(mover, range(int(1.5 * RATE)), strict=False):
+            pass
+
+    with pytest.raises(SafetyError, match="nothing was moved with the payload on: there was no consent"):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP).run(orders.consent, mount)
+    assert orders.seen == ["consent", "mount", "consent"]
+    assert (tmp_path / "empty.csv").exists()
+
+
 @pytest.mark.parametrize(
     ("motion", "at", "room", "said"),
     [

@@ -73,8 +73,11 @@ class Plan:
         """Of all movements [s]."""
         return sum(leg.motion.duration for leg in self.legs)
 
-    def check(self) -> None:
+    def check(self, so_far: str = "nothing was moved") -> None:
         """See that the arm may make all movements.
+
+        Args:
+            so_far: what to say of the arm if it may not.
 
         Raises:
             SafetyError: a limit is passed, or something touches; the message says which.
@@ -82,7 +85,7 @@ class Plan:
         for leg in self.legs:
             if leg.check.problems:
                 raise SafetyError(
-                    f"nothing was moved, because of the way {leg.purpose}: {'; '.join(leg.check.problems)}; choose "
+                    f"{so_far}, because of the way {leg.purpose}: {'; '.join(leg.check.problems)}; choose "
                     "another motion, or move the arm to another place"
                 )
 

@@ -166,9 +166,12 @@ class Procedure:
         return plan_of(self.arm, self.motion, at, empty_run=empty_run, **more)
 
     def _allowed(self, plan: Plan, consent: Callable[[Plan], bool]) -> None:
-        plan.check()
+        plan.check(self._so_far(plan))
         if not consent(plan):
-            raise SafetyError("nothing was moved: there was no consent; type yes when asked, or give --move")
+            raise SafetyError(f"{self._so_far(plan)}: there was no consent; type yes when asked, or give --move")
+
+    def _so_far(self, plan: Plan) -> str:
+        return "nothing was moved" if plan is self.plan else "nothing was moved with the payload on"
 
     def _again(self, consent: Callable[[Plan], bool]) -> Plan:
         """The plan of what is left, from where the arm is now; agreed to anew if that is not where it was left."""
@@ -181,7 +184,7 @@ class Procedure:
         if np.abs(at - expected).max() > AT_START:
             self._say("the arm is not where it was left")
             self._allowed(plan, consent)
-        plan.check()
+        plan.check(self._so_far(plan))
         return plan
 
     def _standing(self, patience: float) -> NDArray[np.float64]:
