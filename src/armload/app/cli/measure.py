@@ -240,7 +240,7 @@ def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Nam
         except SinkError as error:
             again = f"armload identify {found.loaded} --robot {options.robot} --tare {found.empty or options.tare}"
             begun = "" if isinstance(error, SentError) else "nothing was written: "
-            failed = f"{begun}{error}; `{again}` tells the answer"
+            failed = f"{begun}{error}; `{again}`, with what else this line says of arm and payload, tells the answer"
             if interruption.name is not None:
                 print_note(failed)
     if failed is not None:
