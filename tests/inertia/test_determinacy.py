@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armload.inertia import held_probability
+from armload.inertia import DROPPED, SHRINK, held_probability
 
 
 @pytest.mark.parametrize("std", [0.01, 0.1, 1.0])
@@ -22,3 +22,7 @@ def test_of_masses_that_are_held_with_a_probability_that_share_is_held(std):
 
 def test_a_mass_below_zero_is_held_no_more_than_none():
     assert held_probability(-5.0, 0.01, 1.5) == held_probability(0.0, 0.01, 1.5) < 0.01
+
+
+def test_nothing_is_held_any_more_where_a_log_determines_a_mass_of_zero():
+    assert held_probability(0.0, 1.5 / SHRINK, 1.5) < DROPPED < held_probability(0.0, 1.6 / SHRINK, 1.5)

@@ -20,7 +20,16 @@ if TYPE_CHECKING:
         pseudo_inertia,
         pseudo_inertia_to_phi,
     )
-    from armload.inertia.determinacy import HELD, LIGHTEST_HELD, SHRINK, Z95, determined, held, held_probability
+    from armload.inertia.determinacy import (
+        DROPPED,
+        HELD,
+        LIGHTEST_HELD,
+        SHRINK,
+        Z95,
+        determined,
+        held,
+        held_probability,
+    )
     from armload.inertia.orders import ORDERS, from_order, to_order
     from armload.inertia.parameters import (
         NAMES,
@@ -37,6 +46,7 @@ if TYPE_CHECKING:
     from armload.inertia.projection import distance_to_body, near_consistent, nearest_body, nearest_consistent
 
 __all__ = [
+    "DROPPED",
     "HELD",
     "LIGHTEST_HELD",
     "NAMES",

@@ -14,6 +14,9 @@ SHRINK = 3.0
 # [standard deviations] of mass above zero before something counts as held: one empty arm in a thousand holds something
 # (test_an_empty_arm_holds_nothing_and_a_light_payload_is_held_with_a_tare)
 HELD = 3.0
+# of `held_probability`, below which what was held is held no more: the most that a log which just determines the mass
+# says of a mass of zero (test_nothing_is_held_any_more_where_a_log_determines_a_mass_of_zero)
+DROPPED = 1.0 / (1.0 + SHRINK)
 LIGHTEST_HELD = 1e-3  # [kg] less is nothing: a log that is compared with itself leaves so much of rounding
 
 

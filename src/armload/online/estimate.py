@@ -34,7 +34,7 @@ class OnlineEstimate(Estimate):
     relative_to: "arm", "tool" (which the arm was given with), "tare", "profile", or "before": the run of the empty arm
         before the last change was taken for a tare. method: its name.
     determined: which parameters (10,) the data determine. held: whether anything is there at all: from three
-        standard deviations on, until `p_held` is below one half.
+        standard deviations on, until `p_held` is below one quarter.
     rests_on_prior, torque_gain_std, same_arm_assumed: as of an `Identification`; the arm is taken for the tare's until
         there was enough to ask.
     around: (10,) the posterior's mean, about which the intervals are; phi is the nearest body, on a concluded stream.

@@ -14,7 +14,7 @@ from armload.identification.found import explained
 from armload.identification.intervals import Before
 from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
 from armload.identification.reporting import doubt_of, removal
-from armload.inertia import determined, held, held_probability
+from armload.inertia import DROPPED, determined, held, held_probability
 from armload.online.doubts import Doubts
 from armload.online.thresholds import STANDS
 from armload.online.watch import PayloadWatch
@@ -103,7 +103,7 @@ class Judgement:
         mass, std_of_mass = float(estimate.phi[0]), float(std[0])
         self.p_held = held_probability(mass, std_of_mass, float(self._weak[0]))
         # while a payload changes nobody knows the mass, which is no reason to say that it was dropped
-        stays = self.held and self.p_held > 0.5
+        stays = self.held and self.p_held > DROPPED
         self.held = held(mass, std_of_mass, bool(self.determined[0])) or stays
         notes = []
         if not moving:
