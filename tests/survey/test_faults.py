@@ -124,7 +124,8 @@ def test_logs_behind_a_web_server_are_answered_as_those_on_disk_and_once(web, sh
     shutil.copy(share / "0.csv", share / "1.csv")
     again = survey(urls, SETTINGS, out, jobs=1)
     assert (again.logs, again.anew) == (3, 1)
-    copied = as_copy(answers(whole)[0], again.rows[0]["log"])
+    # a server that says what changed is asked for no content, by which copies are known
+    copied = as_copy(answers(whole)[0], again.rows[0]["log"] if silent else None)
     assert answers(again.rows)[1] == copied | {"date": answers(again.rows)[1]["date"]}
 
 
