@@ -447,6 +447,20 @@ def test_the_short_table_of_streams_is_that_of_the_committed_benchmark():
     assert f"{real['changes'] - real['missed']['count']} of {real['changes']} are noticed in time" in page
 
 
+def test_what_the_page_says_of_held_is_in_the_committed_benchmark():
+    parts = json.loads((RESULTS / "events.json").read_text())["parts"]
+    page = " ".join((ROOT / "docs" / "online_measured.md").read_text(encoding="utf-8").split())
+    told = {name: part["held"] for name, part in parts.items() if "held" in part}
+    rates = [name for name in told if name.startswith("rate_")]
+    quick = [told[name] for name in ("steps", "ramps_0.1", "ramps_0.5", "standing", "drop", "cycles", *rates)]
+    assert all(x["turned"] == x["should"] for x in quick)
+    assert f"at a standstill: {sum(x['should'] for x in quick)} times" in page
+    for name, row in (("light", "something light"), ("pushes", "pushes")):
+        assert f"{row} ({told[name]['turned']} for {told[name]['should']})" in page
+    slow = told["ramps_5"]
+    assert f"slow hand-overs ({slow['turned']} times for {slow['should']})" in page
+
+
 def test_the_short_summaries_of_the_hybrid_are_those_of_the_committed_tables():
     page = " ".join((ROOT / "docs" / "hybrid.md").read_text(encoding="utf-8").split())
 

@@ -109,3 +109,11 @@ def test_moments_are_counted_in_the_bin_of_what_was_called(truth, scenes):
     assert so == len(between(12.05, 17.85))
     assert n - so == len(between(0.0, 8.05, 22.25, 30.0))
     assert said["p_held"][0][::2] == (300, 249)  # at 5 s it is about to be
+
+
+def test_turns_of_held_are_counted_beside_those_that_should_be(truth):
+    true = np.array([False, True, True, False, False])
+    said = np.array([False, False, True, True, False])
+    found = truth.turns_of_held(4, said, true, np.arange(1, 5))
+    assert found == {"turned": 4, "should": 2, "wrong": 2, "moments": 4}
+    assert truth.turns_of_held(1, ~said, np.full(5, True), np.arange(5))["should"] == 1  # held from the start

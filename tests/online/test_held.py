@@ -14,11 +14,14 @@ def judged():
     panda = arm("panda")
     judgement, run = Judgement(panda, None), RecursiveLeastSquares(panda)
 
-    def after(*masses):
+    def after(*masses, concluded=False):
         out = []
         for mass, std in masses:
             estimate = Estimate(1.0, mass * np.eye(10)[0], np.diag(np.full(10, std**2)), 1, "panda_link8")
             judgement.judge(estimate, run, "nothing", moving=True, stands=False)
+            out.append(judgement.held)
+        if concluded:
+            judgement.conclude(estimate, run, "nothing", 1.0)
             out.append(judgement.held)
         return out
 
@@ -32,3 +35,7 @@ def test_what_is_held_is_held_until_nothing_is_much_likelier(judged):
 
 def test_nothing_is_held_before_it_is_sure(judged):
     assert judged((0.25, 0.1), (0.29, 0.1), (0.31, 0.1), (0.29, 0.1)) == [False, False, True, True]
+
+
+def test_at_its_end_a_stream_holds_what_a_log_would(judged):
+    assert judged((0.26, 0.005), (0.1, 0.04), concluded=True) == [True, True, False]

@@ -1,11 +1,11 @@
-"""Ctrl-C held back: while an arm moves, until it is at rest; while modules load that would swallow it."""
+"""Ctrl-C held back, while an arm moves or modules load that would swallow it; other signals that end as it does."""
 
 from __future__ import annotations
 
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from types import FrameType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -45,21 +45,36 @@ def held_back() -> Iterator[Interruption]:
             raise KeyboardInterrupt
 
 
-@contextmanager
-def ended_by_sigterm() -> Iterator[None]:
+def ended_by_sigterm() -> AbstractContextManager[None]:
     """Within, SIGTERM, by which a service or a container is stopped, ends as Ctrl-C does: what is left to do is done.
 
     In another thread than the main one, where signals do not come, nothing is changed.
     """
+    return _ended_by(signal.SIGTERM, once=False)
 
+
+def ended_by_hangup() -> AbstractContextManager[None]:
+    """The same of SIGHUP, a terminal that is closed; where it is ignored (nohup), it goes on being so.
+
+    Only the first one counts: the shell passes on what the terminal has sent, and would break off what is being ended.
+    """
+    if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+        return nullcontext()
+    return _ended_by(signal.SIGHUP, once=True)
+
+
+@contextmanager
+def _ended_by(number: signal.Signals, once: bool) -> Iterator[None]:
     def interrupt(*_: object) -> None:
+        if once:
+            signal.signal(number, signal.SIG_IGN)
         raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGTERM, interrupt)
+    before = signal.signal(number, interrupt)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(number, before)

@@ -8,7 +8,7 @@ than `STEP` of its effort limit:
     phi_k = phi_counted + s·Δ,   Δ = phi_found − phi_counted,   s = min(1, STEP / max_j |g_j(q, Δ)| / u_j)
 
 Nothing is written while the answer is unknown or undetermined or the arm moves, and each step is read back. What a
-controller did not take is told again after 1, 2, 4, … 60 s; another load at once.
+controller did not take is told again after 1, 2, 4, … 60 s; one of another mass at once.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ class Feedback:
         if most <= (_ENOUGH if under_way else 1.0) * STEP and abs(difference.mass) < LIGHT:
             if under_way:
                 self._note(f"the controller counts {self.mass:.3f} kg")
-            self._not_taken, self._backoff = None, Backoff(_FIRST, _MOST)
+            self._forget_refusal()
             return None
         if (why := self._held_off(wanted)) is not None:
             return why
@@ -189,7 +189,7 @@ class Feedback:
             if not under_way or isinstance(error, SentError):
                 raise
             raise SinkError(f"{one_line(error)}; it counts {self.mass:.3f} of {wanted.mass:.3f} kg") from None
-        self._not_taken, self._backoff = None, Backoff(_FIRST, _MOST)
+        self._forget_refusal()
         return f"told in steps: {self.mass:.3f} of {wanted.mass:.3f} kg"
 
     def _held_off(self, wanted: InertialParameters) -> str | None:
@@ -198,10 +198,13 @@ class Feedback:
             return None
         before, until, why = self._not_taken
         if abs(wanted.mass - before.mass) > LIGHT:
-            self._not_taken, self._backoff = None, Backoff(_FIRST, _MOST)
+            self._forget_refusal()
             return None
         left = until - time.monotonic()
         return None if left <= 0.0 else f"{why} (told again in {left:.0f} s)"
+
+    def _forget_refusal(self) -> None:
+        self._not_taken, self._backoff = None, Backoff(_FIRST, _MOST)
 
     def _found(self, estimate: OnlineEstimate, end_effector: float) -> Load:
         """The load to count beside the end effector [kg]; zero where nothing is held and nothing is mounted."""

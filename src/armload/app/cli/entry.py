@@ -20,9 +20,7 @@ import difflib
 import importlib
 import logging
 import os
-import signal
 import sys
-import threading
 import time
 import traceback
 import warnings
@@ -34,6 +32,7 @@ from armload.app.cli.outputs import check_outputs
 from armload.app.cli.printing import drop_unwritten, print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import missing
+from armload.runtime.interruption import ended_by_hangup
 from armload.runtime.version import __version__
 
 COMMANDS = {
@@ -88,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
         elif stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")  # nor does a file's name that is no UTF-8 stop it
-    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost(), _ended_by_hangup():
+    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost(), ended_by_hangup():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)
     drop_unwritten()  # reported already; the interpreter flushes once more when it ends
@@ -186,27 +185,6 @@ def _no_interruption_lost() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
-
-
-@contextmanager
-def _ended_by_hangup() -> Iterator[None]:
-    """A terminal that is closed (SIGHUP) ends a command as Ctrl-C does; under nohup, which ignores it, it goes on.
-
-    Only the first one counts: the shell passes on what the terminal has sent, and would break off what is being ended.
-    """
-
-    def interrupt(*_: object) -> None:
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
-        yield
-        return
-    before = signal.signal(signal.SIGHUP, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGHUP, before)
 
 
 def _run(arguments: list[str]) -> int:
