@@ -181,7 +181,7 @@ def test_how_often_the_intervals_of_the_centre_and_the_inertia_about_it_held_is_
 
 def test_what_a_tare_is_worth_is_that_of_the_committed_benchmark():
     result, page = json.loads((RESULTS / "benchmark.json").read_text()), (ROOT / "docs" / "hybrid.md").read_text()
-    rows = [line for line in page.split("## A tare, and which one")[1].splitlines() if line.startswith("| ")][1:]
+    rows = [line for line in page.split("## Which tare to record")[1].splitlines() if line.startswith("| ")][1:]
     for row, name in zip(rows, ("untared", "elsewhere", "reference", "same-place", "same-motion"), strict=False):
         mae = result["populations"][name]["methods"]["hybrid"]["mae"]
         errors = (f"{1e3 * mae[result['times'].index(t)][0]:.2g}" for t in (1.0, 6.0))
