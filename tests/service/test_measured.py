@@ -10,7 +10,7 @@ PAGE = " ".join((ROOT / "docs" / "service.md").read_text(encoding="utf-8").split
 
 def test_the_table_of_recovery_is_the_committed_result():
     found = json.loads((RESULTS / "recovery.json").read_text())
-    for told, name in (("with a process ahead", "with a spare process"), ("without (`spare = false`)", "without")):
+    for told, name in (("with a spare process", "with a spare process"), ("without (`spare = false`)", "without")):
         answer, known, spent = (
             found[f"median {what} [s], {name}"]
             for what in ("to an answer", "to a known answer", "processor time until it is known")

@@ -66,7 +66,7 @@ def test_descriptions_and_models_are_files_beside_it_while_names_stay_names(tmp_
 
 def test_the_page_has_a_row_for_every_setting():
     page = (Path(__file__).resolve().parents[2] / "docs" / "service.md").read_text(encoding="utf-8")
-    rows = [line.split("|")[1] for line in page.split("## Its lines")[0].splitlines() if line.startswith("| `")]
+    rows = [line.split("|")[1] for line in page.split("## Output lines")[0].splitlines() if line.startswith("| `")]
     told = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
     of_arms = {field.name for field in dataclasses.fields(ArmSettings)}
     of_the_service = {field.name for field in dataclasses.fields(ServiceSettings)} - {"arms", "token", "duration"}
