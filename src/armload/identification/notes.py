@@ -142,8 +142,8 @@ def leaning_on_prior(leaning: NDArray[np.bool_], families: Sequence[str] = ()) -
             "usually like more than on this log"
         ]
     return [
-        f"the intervals of {_names(leaning)} rest on what payloads are usually like more than on this log: of "
-        "something wide and thin (a tray, a frame) believe --method map-gp instead"
+        f"the intervals of {_names(leaning)} rest on what payloads are usually like more than on this log: for a wide "
+        "and thin payload (a tray, a frame) use --method map-gp"
     ]
 
 

@@ -27,7 +27,7 @@ examples:
   armload identify loaded.csv --robot my_arm.urdf --frame tool0 --tare unloaded.csv
   armload identify run.csv --robot ur10e --gravity=-9.81,0,0        (on a wall)
   armload identify run.csv --robot panda --tare yesterday.csv --tare-age 1d
-  armload identify run.csv --robot panda --profile arm.profile       (an arm that knows itself: armload profile)
+  armload identify run.csv --robot panda --profile arm.profile       (what armload profile learned of the arm)
   armload identify run.csv --robot panda --mass 1.200±0.002         (weighed: what is left is found better)
   armload identify run.csv --robot panda --com 0,0,0.06±0.003       (the centre of mass of a drawing, [m])
   armload identify run.csv --robot panda --body gear.json           (a drawing, and how far it can be trusted)
