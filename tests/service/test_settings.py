@@ -174,6 +174,13 @@ def test_a_token_that_is_no_text_is_one_sentence(tmp_path, name, said):
         read_token(tmp_path / name)
 
 
+def test_a_text_may_begin_with_the_mark_that_some_editors_put_there(tmp_path):
+    for name, text in (("cell.toml", CELL), ("token", "0123456789abcdef\n")):
+        (tmp_path / name).write_text(text, encoding="utf-8-sig")
+    assert read_settings(tmp_path / "cell.toml").every == 0.5
+    assert read_token(tmp_path / "token") == "0123456789abcdef"
+
+
 def test_a_setting_with_a_zero_byte_is_one_sentence(tmp_path):
     (tmp_path / "cell.toml").write_text(CELL.replace('save = "state"', 'save = "st\\u0000ate"'))
     with pytest.raises(UsageError, match=r"save is .* expected a text without a zero byte"):
