@@ -16,12 +16,12 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
 from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
+from armload.devices.recorder import next_free
 from armload.errors import ArmloadError, IdentificationError
 from armload.identification.tare_age import age_of, in_words
 from armload.online import OnlineEstimate, OnlineIdentifier
@@ -245,15 +245,6 @@ class ArmProcess:
             if why != self._failed:
                 self.note(f"the state cannot be saved in {path}: {why}; the one saved before stays")
             self._failed = why
-
-
-def next_free(record: str) -> str:
-    """The record's name, or the first of run.again1.csv, run.again2.csv, … that does not exist yet."""
-    path, k = Path(record), 0
-    while path.exists():
-        k += 1
-        path = Path(record).with_suffix(f".again{k}{Path(record).suffix}")
-    return str(path)
 
 
 def main() -> None:

@@ -227,8 +227,8 @@ def without_effect(options: argparse.Namespace) -> list[str]:
 def _reopened(first: Detached, options: argparse.Namespace, arm: Arm, kept: str | None) -> Reconnecting:
     """A robot that is opened again when it is lost; each connection has a record of its own."""
     from armload.devices import Detached
+    from armload.devices.recorder import next_free
     from armload.service import Reconnecting
-    from armload.service.arm_process import next_free
 
     def opens() -> Detached:
         record = None if kept is None else next_free(kept)
