@@ -153,6 +153,20 @@ def test_a_state_belongs_to_the_settings_it_was_made_with(of, tmp_path):
     )
 
 
+def test_a_state_belongs_to_the_folder_of_its_tare_as_it_was(tmp_path):
+    bag = tmp_path / "empty_bag"
+    (bag / "parts").mkdir(parents=True)
+    (bag / "parts" / "empty_0.mcap").write_text("1")
+    settings = ArmSettings("panda", name="left", source="sim", save=str(tmp_path), tare=str(bag))
+    first = settings.state
+    assert settings.state == first
+    (bag / "parts" / "empty_0.mcap").write_text("2")
+    second = settings.state
+    assert second != first
+    (bag / "parts" / "empty_0.mcap").rename(bag / "parts" / "empty_1.mcap")
+    assert settings.state not in (first, second)
+
+
 def test_a_service_without_arms_is_refused():
     with pytest.raises(UsageError, match="no arm"):
         ServiceSettings(())
