@@ -8,7 +8,8 @@ by chunks of a second, has room for what is said of the samples, and is read by 
 A log must be finite and strictly increasing in time. What is not goes to a file beside it: `run.csv` keeps its bad
 samples in `run.bad.jsonl`, one JSON object per line: `why`, and t, q, dq and tau as they came. JSON has no numbers that
 are not finite: they are the strings "NaN", "Infinity" and "-Infinity", which `float` understands. If the robot's clock
-starts anew (two samples running before the last one kept), the log goes on in `run.2.csv`, `run.3.csv`, …
+starts anew (two samples running before the last one kept), the log goes on in `run.2.csv`, `run.3.csv`, …; an MCAP also
+does after six hours.
 """
 
 from __future__ import annotations
@@ -84,6 +85,9 @@ class Recorder:
             anew, self._late = row[0] > self._late, row[0]
             if not anew:
                 return self._refuse(sample, f"not after t = {self._last!r} s")
+            self._part.close()
+            self._part = self._next_part()
+        elif isinstance(self._part, McapPart) and self._part.ends_before(row[0]):
             self._part.close()
             self._part = self._next_part()
         self._part.append(row)
