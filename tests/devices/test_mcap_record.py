@@ -149,6 +149,17 @@ def test_a_clock_that_starts_anew_starts_a_new_part(tmp_path, panda):
     ]  # one is doubted
 
 
+def test_a_record_of_many_hours_is_in_files_of_six_of_which_each_is_whole(tmp_path, panda):
+    made = [sample._replace(t=1800.0 * k) for k, sample in enumerate(samples(30))]
+    with Recorder(tmp_path / "run.mcap", 7, panda.joint_names) as recorder:
+        for sample in made:
+            recorder.append(sample)
+    assert [path.name for path in recorder.paths] == ["run.mcap", "run.2.mcap", "run.3.mcap"]
+    assert recorder.kept == 30
+    kept = [len(decoded(path)[JOINT_STATES]) for path in recorder.paths]
+    assert kept == [12, 12, 6]
+
+
 def test_a_record_cut_anywhere_is_read_up_to_a_whole_chunk_and_says_so(tmp_path, panda):
     sent = samples(3000)
     whole = tmp_path / "whole.mcap"

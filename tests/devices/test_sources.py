@@ -24,6 +24,7 @@ from armload.devices.order import (
     payloads_from_json,
     payloads_to_json,
 )
+from armload.devices.recorder import next_free
 from armload.errors import ArmloadError, MotionError, PayloadError, RecordingError, SourceError
 from armload.inertia import InertialParameters
 from armload.motion import EndlessMotion, FourierMotion, Motion, taie2024
@@ -273,6 +274,15 @@ def test_a_record_is_never_written_over(tmp_path):
         Recorder(tmp_path / "run.npz", 7)
     with pytest.raises(RecordingError, match="cannot be written"):
         Recorder(tmp_path / "nowhere" / "run.csv", 7)
+
+
+@pytest.mark.parametrize("left", ["run.csv", "run.2.csv", "run.bad.jsonl"])
+def test_the_next_free_name_is_one_under_which_a_record_can_begin_whatever_was_taken_away(tmp_path, left):
+    (tmp_path / left).write_text("of the record before")
+    name = next_free(tmp_path / "run.csv")
+    Recorder(name, 7).close()
+    assert Path(name).name == "run.again1.csv"
+    assert next_free(tmp_path / "other.csv") == str(tmp_path / "other.csv")
 
 
 @pytest.mark.parametrize("name", ["run.2.csv", "run.bad.jsonl"])

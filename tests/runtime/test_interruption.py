@@ -28,3 +28,15 @@ def test_an_interruption_that_a_module_would_swallow_comes_afterwards():
         said.append(swallows())
     assert said == ["went on"]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_was_ignored_stays_so_while_others_are_held_back(number):
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        with held_back() as interruption:
+            signal.raise_signal(number)
+        assert interruption.name is None
+        assert signal.getsignal(number) == signal.SIG_IGN
+    finally:
+        signal.signal(number, before)

@@ -201,6 +201,8 @@ def test_what_waits_for_a_dead_receiver_is_bounded():
 def test_an_address_that_is_none_is_refused():
     with pytest.raises(UsageError, match="expected an address"):
         Webhook("ftp://host/x")
+    with pytest.raises(UsageError, match="expected an address"):
+        Webhook("https://cell..host/x")
     with pytest.raises(UsageError, match=r"ftp://…@host/x") as said:
         Webhook("ftp://me:secret@host/x")
     assert "secret" not in str(said.value)

@@ -167,3 +167,21 @@ def test_while_the_disk_is_full_the_last_state_stays_and_it_is_saved_again_once_
     assert "cannot be saved" in about[0]
     assert "File too large" in about[0]
     assert about[1] == "the state is saved again"
+
+
+def test_how_long_ago_a_state_was_saved_does_not_change_with_the_clock(panda, analytic_log, tmp_path, monkeypatch):
+    path = tmp_path / "run.csv"
+    write_recording(path, analytic_log(panda, duration=1.0))
+    settings = ArmSettings(name="left", source=str(path), robot="panda", method="map", save=str(tmp_path))
+    said = []
+    for _ in ("saved", "taken up"):
+        process = ArmProcess(settings, 0.1)
+        monkeypatch.setattr(process, "_write", said.append)
+        process.run()
+        process._say(None, None)
+        now = time.time()
+        with monkeypatch.context() as later:
+            later.setattr("time.time", lambda now=now: now + 86400.0)
+            process._say(None, None)
+        before, after = (line["saved"] for line in said[-2:])
+        assert 0.0 <= before <= after < before + 3600.0

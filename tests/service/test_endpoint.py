@@ -12,7 +12,7 @@ import pytest
 
 from armload.errors import UsageError
 from armload.service import Endpoint
-from armload.service.endpoint import _MOST, _Handler
+from armload.service.endpoint import _MOST, _STREAMS, _Handler
 
 
 class Cell:
@@ -60,19 +60,42 @@ def asked(address, path, host="localhost"):
 
 
 def test_clients_that_leave_the_stream_of_an_arm_that_ended_make_room_for_others(address):
-    for _ in range(_MOST):
+    for _ in range(_STREAMS):
         connection, line = asked(address, "/stream/ended")
         connection.close()
         assert line.endswith(b"200 OK")
     end = time.monotonic() + 20.0
     while True:
-        try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{address[1]}/health", timeout=10.0) as response:
-                assert json.loads(response.read())["well"]
-                break
-        except OSError:  # there is no room yet
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        connection, line = asked(address, "/stream/ended")
+        connection.close()
+        if line.endswith(b"200 OK"):
+            break
+        assert time.monotonic() < end  # there is no room yet
+        time.sleep(0.05)
+
+
+def test_streams_that_stay_open_leave_room_for_who_asks_whether_all_is_well(address):
+    with contextlib.ExitStack() as open_ones:
+        for _ in range(_STREAMS):
+            connection, line = asked(address, "/stream")
+            open_ones.enter_context(connection)
+            assert line.endswith(b"200 OK")
+        for _ in range(3):  # and more are told why not
+            connection, line = asked(address, "/stream/right")
+            connection.close()
+            assert line.endswith(b"503 Service Unavailable")
+        with urllib.request.urlopen(f"http://127.0.0.1:{address[1]}/health", timeout=10.0) as response:
+            assert json.loads(response.read())["well"]
+
+
+def test_a_connection_too_many_is_told_so(address):
+    with contextlib.ExitStack() as open_ones:
+        for _ in range(_MOST):  # that ask for nothing
+            open_ones.enter_context(socket.create_connection(address, timeout=10.0))
+        with socket.create_connection(address, timeout=10.0) as connection:
+            said = connection.makefile("rb").read()
+    assert said.startswith(b"HTTP/1.0 503")
+    assert "too many connections" in json.loads(said.partition(b"\r\n\r\n")[2])["error"]
 
 
 @pytest.mark.skipif(not socket.has_ipv6, reason="this machine has no IPv6")

@@ -149,7 +149,10 @@ def test_a_password_with_any_character_in_it_is_not_shown(within):
     assert "host" in str(said.value)
 
 
-@pytest.mark.parametrize("url", ["http://host/x", "mqtt://", "mqtt://host:port", "mqtt://host/a/#"])
+@pytest.mark.parametrize(
+    "url",
+    ["http://host/x", "mqtt://", "mqtt://host:port", "mqtt://host/a/#", "mqtt://cell..host/x", f"mqtt://{'x' * 64}/x"],
+)
 def test_an_address_that_is_none_is_refused(url):
     with pytest.raises(UsageError, match="expected an address such as mqtt://HOST:1883/PREFIX"):
         checked(url)

@@ -60,6 +60,22 @@ def test_a_reader_that_is_killed_and_one_that_stalls_are_replaced(source):
     assert f"nothing for {STALLED:g} s" in lost[1]
 
 
+@pytest.mark.full  # some seconds
+def test_a_source_that_takes_its_time_for_its_first_sample_is_not_opened_again_meanwhile(panda, monkeypatch):
+    monkeypatch.setattr("armload.service.reconnecting.STALLED", 0.05)  # a simulator takes a second
+    source = Reconnecting(lambda: Detached("sim", panda, rate=100.0), name="sim", n=7)
+    try:
+        waited = 0
+        for sample in source.ticking(0.01):
+            if sample is not None:
+                break
+            waited += source.present is not None
+        assert waited > 10
+        assert source.connections == 1
+    finally:
+        source.close()
+
+
 def test_whoever_was_away_goes_on_with_the_newest_sample(source):
     samples = (sample for sample in source.ticking(0.05) if sample is not None)
     before = next(samples).t

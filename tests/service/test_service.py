@@ -355,6 +355,33 @@ def test_a_full_disk_under_its_output_ends_no_service(cell, stream):
             process.kill()
 
 
+@pytest.mark.full  # some seconds
+def test_a_service_whose_notes_nobody_reads_goes_on(cell):
+    """A terminal that is held (Ctrl-S), or a log that is collected by what hangs."""
+    command = [sys.executable, "-m", "armload", "serve", str(cell("left"))]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        answers = map(json.loads, process.stdout)
+        next(line for line in answers if line.get("known"))
+        full = os.open(f"/proc/{process.pid}/fd/2", os.O_WRONLY | os.O_NONBLOCK)
+        for size in (4096, 1):  # to the last byte
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    os.write(full, b"x" * size)
+        os.close(full)
+        for pid in children(process.pid):
+            os.kill(pid, signal.SIGKILL)
+        # an arm is said to be lost, and is answered again all the same
+        assert any(line.get("restarts") == 1 and line["known"] for line in answers)
+        process.send_signal(signal.SIGTERM)
+        for _ in answers:
+            pass
+        assert process.wait(60.0) == 0
+    finally:
+        process.kill()
+        process.communicate()
+
+
 def free_port():
     with socket.create_server(("127.0.0.1", 0)) as server:
         return server.getsockname()[1]

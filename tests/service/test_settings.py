@@ -153,6 +153,20 @@ def test_a_state_belongs_to_the_settings_it_was_made_with(of, tmp_path):
     )
 
 
+def test_a_state_belongs_to_the_folder_of_its_tare_as_it_was(tmp_path):
+    bag = tmp_path / "empty_bag"
+    (bag / "parts").mkdir(parents=True)
+    (bag / "parts" / "empty_0.mcap").write_text("1")
+    settings = ArmSettings("panda", name="left", source="sim", save=str(tmp_path), tare=str(bag))
+    first = settings.state
+    assert settings.state == first
+    (bag / "parts" / "empty_0.mcap").write_text("2")
+    second = settings.state
+    assert second != first
+    (bag / "parts" / "empty_0.mcap").rename(bag / "parts" / "empty_1.mcap")
+    assert settings.state not in (first, second)
+
+
 def test_a_service_without_arms_is_refused():
     with pytest.raises(UsageError, match="no arm"):
         ServiceSettings(())
@@ -172,6 +186,13 @@ def test_a_token_that_is_no_text_is_one_sentence(tmp_path, name, said):
     (tmp_path / "token").write_bytes(b"\xff" * 32)
     with pytest.raises(UsageError, match=said):
         read_token(tmp_path / name)
+
+
+def test_a_text_may_begin_with_the_mark_that_some_editors_put_there(tmp_path):
+    for name, text in (("cell.toml", CELL), ("token", "0123456789abcdef\n")):
+        (tmp_path / name).write_text(text, encoding="utf-8-sig")
+    assert read_settings(tmp_path / "cell.toml").every == 0.5
+    assert read_token(tmp_path / "token") == "0123456789abcdef"
 
 
 def test_a_setting_with_a_zero_byte_is_one_sentence(tmp_path):

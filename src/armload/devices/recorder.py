@@ -8,7 +8,8 @@ by chunks of a second, has room for what is said of the samples, and is read by 
 A log must be finite and strictly increasing in time. What is not goes to a file beside it: `run.csv` keeps its bad
 samples in `run.bad.jsonl`, one JSON object per line: `why`, and t, q, dq and tau as they came. JSON has no numbers that
 are not finite: they are the strings "NaN", "Infinity" and "-Infinity", which `float` understands. If the robot's clock
-starts anew (two samples running before the last one kept), the log goes on in `run.2.csv`, `run.3.csv`, …
+starts anew (two samples running before the last one kept), the log goes on in `run.2.csv`, `run.3.csv`, …; an MCAP also
+does after six hours.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ class Recorder:
         self._bad_lines: GrowingFile | None = None
         self._last = -math.inf
         self._late = math.inf  # time of the sample before, if it was a late one
-        for other in (self._path_of_part(2), self._path_of_bad()):  # refused now, not when it is needed
+        for other in _beside(self.path):  # refused now, not when it is needed
             if other.exists():
                 raise RecordingError(f"{other} exists, and belongs to another record: choose another name than {path}")
         self._part = self._next_part()
@@ -84,6 +85,9 @@ class Recorder:
             anew, self._late = row[0] > self._late, row[0]
             if not anew:
                 return self._refuse(sample, f"not after t = {self._last!r} s")
+            self._part.close()
+            self._part = self._next_part()
+        elif isinstance(self._part, McapPart) and self._part.ends_before(row[0]):
             self._part.close()
             self._part = self._next_part()
         self._part.append(row)
@@ -114,23 +118,40 @@ class Recorder:
         self.close()
 
     def _next_part(self) -> _CsvPart | McapPart:
-        path = self._path_of_part(len(self.paths) + 1)
+        path = _path_of_part(self.path, len(self.paths) + 1)
         part = McapPart(path, self._names) if path.suffix.lower() == ".mcap" else _CsvPart(path, self.n)
         self.paths.append(path)
         return part
 
-    def _path_of_part(self, part: int) -> Path:
-        return self.path if part == 1 else self.path.with_name(f"{self.path.stem}.{part}{self.path.suffix}")
-
-    def _path_of_bad(self) -> Path:
-        return self.path.with_name(f"{self.path.stem}.bad.jsonl")
-
     def _refuse(self, sample: Sample, why: str) -> None:
         if self._bad_lines is None:
-            self._bad_lines = GrowingFile(self._path_of_bad())
+            self._bad_lines = GrowingFile(_path_of_bad(self.path))
         values = {name: _strict(np.asarray(value).tolist()) for name, value in sample._asdict().items()}
         self._bad_lines.append((json.dumps({"why": why, **values}, allow_nan=False) + "\n").encode())
         self.bad += 1
+
+
+def next_free(path: str | Path) -> str:
+    """The record's name, or the first of run.again1.csv, run.again2.csv, … under which a record can begin."""
+    first, k = Path(path), 0
+    name = first
+    while any(other.exists() for other in (name, *_beside(name))):  # a record that was taken away may have left these
+        k += 1
+        name = first.with_suffix(f".again{k}{first.suffix}")
+    return str(name)
+
+
+def _beside(path: Path) -> tuple[Path, Path]:
+    """What a record may need beside its file."""
+    return _path_of_part(path, 2), _path_of_bad(path)
+
+
+def _path_of_part(path: Path, part: int) -> Path:
+    return path if part == 1 else path.with_name(f"{path.stem}.{part}{path.suffix}")
+
+
+def _path_of_bad(path: Path) -> Path:
+    return path.with_name(f"{path.stem}.bad.jsonl")
 
 
 class Recorded(Source):

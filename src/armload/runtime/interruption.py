@@ -29,13 +29,15 @@ class Interruption:
 def held_back() -> Iterator[Interruption]:
     """Within, Ctrl-C (SIGINT), SIGTERM and SIGHUP are only noted; KeyboardInterrupt is raised at the end.
 
-    In another thread than the main one, where signals do not come, nothing is changed.
+    What is ignored goes on being so: a program under nohup is to outlive its terminal, also while an arm moves. In
+    another thread than the main one, where signals do not come, nothing is changed.
     """
     interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
         yield interruption
         return
-    before = {number: signal.signal(number, interruption.heard) for number in _SIGNALS}
+    heard = [number for number in _SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, interruption.heard) for number in heard}
     try:
         yield interruption
     finally:

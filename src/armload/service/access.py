@@ -23,7 +23,7 @@ def read_token(path: str | Path) -> str:
         UsageError: the file cannot be read, or holds fewer than 16 characters.
     """
     try:
-        token = Path(path).read_text(encoding="utf-8").strip()
+        token = Path(path).read_text(encoding="utf-8-sig").strip()  # some editors begin a text with a mark
     except OSError as error:
         raise UsageError(f"the token's file {path} cannot be read: {error.strerror}") from None
     except ValueError:  # bytes that are no UTF-8, or a name with a zero in it

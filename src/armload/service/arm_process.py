@@ -16,12 +16,12 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 from armload.arms import Arm
 from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
+from armload.devices.recorder import next_free
 from armload.errors import ArmloadError, IdentificationError
 from armload.identification.tare_age import age_of, in_words
 from armload.online import OnlineEstimate, OnlineIdentifier
@@ -56,7 +56,7 @@ class ArmProcess:
         self.settings, self.every, self._reader = settings, min(every, TICK), None
         self._state = settings.state  # of the files as they are now: one written anew is not what the stream goes by
         self._told = self._saved = -float("inf")
-        self._kept: float | None = None  # when the state was last saved or taken up, by the wall's clock
+        self._kept: float | None = None  # when the state that is there was saved [s, monotonic]
         self._continued = False  # whether it goes on from a state
         self._failed: str | None = None  # why it could not be saved
         self._newest: Sample | None = None  # that the state saved last is of
@@ -150,7 +150,7 @@ class ArmProcess:
             "connection": source.state,
             "connections": source.connections,
             "lost": source.lost,
-            "saved": None if self._kept is None else max(0.0, time.time() - self._kept),
+            "saved": None if self._kept is None else now - self._kept,
             "arm_changed": None if self.session is None else self.session.identifier.arm_changed,
         }
         if self._feedback is not None:
@@ -212,8 +212,7 @@ class ArmProcess:
         if path is None or not path.exists():
             return None
         try:
-            saved = saved_at(path)
-            ago = time.time() - saved
+            ago = time.time() - saved_at(path)
             if ago < -SESSION:
                 self.note(f"{path} was saved at a time that is still to come, nobody knows how old it is: begun anew")
                 return None
@@ -227,7 +226,7 @@ class ArmProcess:
         except (IdentificationError, OSError) as error:
             self.note(f"{str(error).removesuffix(': begin without it')}: begun anew")
             return None
-        self._kept, self._continued = saved, True
+        self._kept, self._continued = time.monotonic() - max(ago, 0.0), True
         self.note(f"continued from {path}, saved {max(ago, 0.0):.0f} s ago")
         return identifier
 
@@ -240,21 +239,12 @@ class ArmProcess:
             session.identifier.save(path)
             if self._failed is not None:
                 self.note("the state is saved again")
-            self._kept, self._failed, self._newest = time.time(), None, session.sample
+            self._kept, self._failed, self._newest = time.monotonic(), None, session.sample
         except (ArmloadError, OSError) as error:
             why = error.strerror or str(error) if isinstance(error, OSError) else str(error)
             if why != self._failed:
                 self.note(f"the state cannot be saved in {path}: {why}; the one saved before stays")
             self._failed = why
-
-
-def next_free(record: str) -> str:
-    """The record's name, or the first of run.again1.csv, run.again2.csv, … that does not exist yet."""
-    path, k = Path(record), 0
-    while path.exists():
-        k += 1
-        path = Path(record).with_suffix(f".again{k}{Path(record).suffix}")
-    return str(path)
 
 
 def main() -> None:

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from armload.service.service import Service
 
 _MOST = 32  # connections at once: a page and some scripts, not a crowd
+_STREAMS = 24  # of them, which stay: whoever asks /health gets in beside them
+_FULL = b"HTTP/1.0 503 Service Unavailable\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n%s"
+_TOO_MANY = b'{"error": "too many connections at once: try again"}\n'
 _PATIENCE = 10.0  # [s] a client may take to send its request, or to take a line
 _LOOK = 1.0  # [s] without a line after which a stream looks whether its client is still there
 
@@ -36,7 +39,7 @@ class Endpoint:
     | `/arms` | the newest answers of all arms, by name |
     | `/arms/NAME` | one of them |
     | `/health` | 200 if all arms are known, else 503, with the reasons |
-    | `/stream`, `/stream/NAME` | lines of JSON, as on standard output, until the client goes |
+    | `/stream`, `/stream/NAME` | lines of JSON, as on standard output, until the client goes; 503 beyond 24 at once |
 
     Args:
         service: what to ask. host, port: 0: a free one. token: a request must bring `Authorization: Bearer TOKEN`.
@@ -72,11 +75,14 @@ class _Server(ThreadingHTTPServer):
     block_on_close = False
 
     def __init__(self, *arguments: Any) -> None:
-        self._free = threading.Semaphore(_MOST)
+        self._free, self.streams = threading.Semaphore(_MOST), threading.Semaphore(_STREAMS)
         super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
         if not self._free.acquire(blocking=False):
+            with contextlib.suppress(OSError):  # without waiting for what it asks, or for its taking the answer
+                request.setblocking(False)
+                request.send(_FULL % (len(_TOO_MANY), _TOO_MANY))
             self.shutdown_request(request)
             return
         super().process_request(request, client_address)
@@ -135,7 +141,7 @@ class _Handler(BaseHTTPRequestHandler):
             unknown = {name: said["why"] for name, said in unknown.items() if not said["known"]}
             self._answer(503 if unknown else 200, {"well": not unknown, "unknown": unknown})
         elif parts[:1] == ["stream"] and len(parts) <= 2:
-            self._stream(parts[1] if len(parts) == 2 else None)
+            self._stream_if_free(parts[1] if len(parts) == 2 else None)
         else:
             self._answer(404, {"error": "expected /arms, /arms/NAME, /health, /stream or /stream/NAME"})
 
@@ -167,6 +173,16 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         if self.command != "HEAD":
             self.wfile.write(text)
+
+    def _stream_if_free(self, name: str | None) -> None:
+        assert isinstance(self.server, _Server)
+        if not self.server.streams.acquire(blocking=False):
+            self._answer(503, {"error": f"{_STREAMS} streams are open already: close one, or ask /arms"})
+            return
+        try:
+            self._stream(name)
+        finally:
+            self.server.streams.release()
 
     def _stream(self, name: str | None) -> None:
         self.send_response(200)

@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 from armload.errors import UsageError
 from armload.runtime.extras import install
-from armload.service.receiver import Health, without_user
+from armload.service.receiver import Health, is_host, without_user
 
 _KEPT = 1000  # messages that wait; then new ones are dropped
 _LONGEST = 60  # [s] between two trials to connect
@@ -98,6 +98,6 @@ def checked(url: str) -> Any:
     except ValueError:
         raise UsageError(f"the MQTT broker is {without_user(url)!r}: {said}") from None
     wrong = parts.scheme not in _PORTS or not parts.hostname or parts.port == 0 or parts.query
-    if wrong or any(x in url for x in "+# ") or not url.isprintable():
+    if wrong or any(x in url for x in "+# ") or not url.isprintable() or not is_host(parts.hostname or ""):
         raise UsageError(f"the MQTT broker is {without_user(url)!r}: {said}")
     return parts

@@ -40,3 +40,16 @@ def without_user(url: str) -> str:
     'mqtts://…@host:8883/cell'
     """
     return _USER.sub("…@", url)
+
+
+def is_host(name: str) -> bool:
+    """Whether a name can be looked up at all: what cannot would end the thread that sends, or be tried for ever.
+
+    >>> is_host("cell.example"), is_host("cell..example")
+    (True, False)
+    """
+    try:
+        name.encode("idna")  # as the look-up does
+    except UnicodeError:
+        return False
+    return True

@@ -15,6 +15,7 @@ from armload.service.transit import Transit
 from armload.service.unknown import Link
 
 STALLED = 3.0  # [s] without a sample after which the connection counts as lost: two lost TCP packets cost three
+BEGUN = 10.0  # [s] the same before its first: a simulator computes for a second, on a busy or small machine for several
 BEHIND = 1.0  # [s] a sample may wait before the newest takes its place: saving a state takes a tenth
 # [s] between two words of a reason that stays: a robot that is off over the weekend is tried twelve times a minute
 REMINDED = 600.0
@@ -122,8 +123,9 @@ class Reconnecting(Source):
                         return
                     if sample is None:
                         silent = time.monotonic() - (began if self.heard is None else max(began, self.heard))
-                        if silent > STALLED:
-                            raise SourceError(f"{self.name} has sent nothing for {STALLED:g} s")
+                        longest = BEGUN if self.resumed is None else STALLED
+                        if silent > longest:
+                            raise SourceError(f"{self.name} has sent nothing for {longest:g} s")
                         yield None
                         continue
                     self._noted(sample)
@@ -138,7 +140,7 @@ class Reconnecting(Source):
                 self.state = "ended"
                 return
             self.state, self.why = "lost", stopped
-            wait = self._backoff.failed(time.monotonic() - began)
+            wait = self._backoff.failed(0.0 if self.resumed is None else time.monotonic() - began)
             self._tell(stopped, wait, "opened")
             yield from self._let_go(wait, tick)
 

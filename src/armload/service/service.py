@@ -226,7 +226,7 @@ class Service:
     def _as_of_now(self, answer: dict[str, Any], name: str) -> dict[str, Any]:
         """The answer with what has passed since it was made; of a process that is silent nothing is known."""
         since = max(0.0, time.monotonic() - answer.pop("told"))
-        for key in ("age", "lag"):
+        for key in ("age", "lag", "saved"):
             answer[key] = None if answer.get(key) is None else answer[key] + since
         if since > 1.0 and answer["unknown"] not in (Unknown.STARTING, Unknown.COMPILING, Unknown.SOURCE_ENDED):
             answer |= _unknown(f"its process has said nothing for {since:.1f} s")

@@ -131,8 +131,8 @@ class ArmSettings(ArmOptions, KnownOptions):
                 del asked[key]
         asked["rate"] = _RATE if self.rate is None else self.rate  # as versions wrote it that had no other word for it
         for key in ("tare", "profile", "tool", "body"):
-            if asked.get(key) is not None and (path := Path(asked[key])).is_file():
-                asked[key] = [asked[key], hashlib.sha256(path.read_bytes()).hexdigest()]
+            if asked.get(key) is not None and ((path := Path(asked[key])).is_file() or path.is_dir()):
+                asked[key] = [asked[key], _digest(path)]
         digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
         return Path(self.save) / f"{self.name}-{digest}.npz"
 
@@ -197,6 +197,14 @@ class ServiceSettings:
             )
 
 
+def _digest(path: Path) -> str:
+    """SHA-256 of a file, or of all files in a folder, as a bag of ROS 2 is one."""
+    if not path.is_dir():
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    files = sorted(file for file in path.rglob("*") if file.is_file())
+    return hashlib.sha256("".join(f"{file.relative_to(path)} {_digest(file)} " for file in files).encode()).hexdigest()
+
+
 def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
     """The settings in a TOML file; paths in it are relative to its folder.
 
@@ -208,7 +216,7 @@ def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
     """
     path = Path(path)
     try:
-        said = tomllib.loads(path.read_text(encoding="utf-8"))
+        said = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin a text with a mark
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from armload.errors import UsageError, one_line
 from armload.service.backoff import Backoff
-from armload.service.receiver import Health, without_user
+from armload.service.receiver import Health, is_host, without_user
 
 _ANSWERED = 5.0  # [s] a receiver may take
 _LONGEST = 60.0  # [s] between two trials
@@ -133,7 +133,7 @@ def check_webhook(url: str, headers: Mapping[str, str], called: str = "the webho
         port = parts.port
     except ValueError:
         raise UsageError(f"{said}, with a port from 1 to 65535") from None
-    if parts.scheme not in ("http", "https") or not parts.hostname:
+    if parts.scheme not in ("http", "https") or not parts.hostname or not is_host(parts.hostname):
         raise UsageError(said)
     if port == 0:
         raise UsageError(f"{said}, with a port from 1 to 65535")

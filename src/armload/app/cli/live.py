@@ -22,7 +22,7 @@ from armload.app.cli.arguments import (
 )
 from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
 from armload.app.cli.outputs import check_output
-from armload.app.cli.printing import print_note
+from armload.app.cli.printing import notes_aside, print_note
 from armload.errors import ArmloadError, IdentificationError, ModelError, UsageError
 from armload.runtime.interruption import ended_by_sigterm, held_back
 
@@ -192,7 +192,7 @@ def run(options: argparse.Namespace) -> int | None:
     age, aged = age_of(tare, began, options.tare_age)
     for note in aged:
         _warn(note)
-    with ended_by_sigterm(), Steadied(source) if options.steady else source as source:
+    with notes_aside(), ended_by_sigterm(), Steadied(source) if options.steady else source as source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         more = {"known": known, "recorder": recorder, "tare_age": age}
         session = Session(source, arm, tare, options.method, _warn, profile, **more)
@@ -227,8 +227,8 @@ def without_effect(options: argparse.Namespace) -> list[str]:
 def _reopened(first: Detached, options: argparse.Namespace, arm: Arm, kept: str | None) -> Reconnecting:
     """A robot that is opened again when it is lost; each connection has a record of its own."""
     from armload.devices import Detached
+    from armload.devices.recorder import next_free
     from armload.service import Reconnecting
-    from armload.service.arm_process import next_free
 
     def opens() -> Detached:
         record = None if kept is None else next_free(kept)

@@ -185,8 +185,8 @@ def print_advice(found: Bound, advice: Advice | None) -> None:
     from armload.inertia import NAMES
 
     print(
-        "at best: an arm and a noise as expected (a milder arm is known better), a torque whose scale is right (if it is "
-        "off by 1 %, the mass is, too)"
+        "at best: an arm and a noise as expected (a milder arm is known better), a torque whose scale is right (if it "
+        "is off by 1 %, the mass is, too)"
     )
     missing = [name for name, known in zip(NAMES, found.determined[-1], strict=True) if not known]
     if not missing:

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
+from armload.app.cli.aside import Aside
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
@@ -45,10 +47,29 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
+_aside: Aside[str] | None = None  # who writes the notes, where that is not whoever says them
+
+
 def print_note(text: str) -> None:
     """One line on stderr, so that stdout holds the answer only; where it cannot be written, nothing ends for that."""
+    (_write_note if _aside is None else _aside.put)(f"armload: {' '.join(text.split())}")
+
+
+def _write_note(line: str) -> None:
     with suppress(OSError):  # a log on a full disk
-        print(f"armload: {' '.join(text.split())}", file=sys.stderr, flush=True)
+        print(line, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def notes_aside() -> Iterator[None]:
+    """Within, nobody who says a note waits for whoever reads stderr: a terminal that is held (Ctrl-S), a full pipe."""
+    global _aside
+    aside = _aside = Aside(_write_note)
+    try:
+        yield
+    finally:
+        _aside = None
+        aside.close(1.0)
 
 
 def drop_unwritten() -> None:

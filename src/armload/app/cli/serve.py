@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import queue
 import signal
 import sys
 import threading
@@ -23,8 +22,9 @@ from armload.app.cli.arguments import (
     file_name,
     output_folder,
 )
+from armload.app.cli.aside import Aside
 from armload.app.cli.named import robot_of
-from armload.app.cli.printing import drop_unwritten, print_note
+from armload.app.cli.printing import drop_unwritten, notes_aside, print_note
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -95,13 +95,20 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int | None:
     """Serve until all sources end, or until SIGTERM; 2 where an arm cannot be begun with."""
-    from armload.service import Endpoint, Service
     from armload.service.beginning import checked
 
     settings = settings_of(options)
     checked(settings)
-    service, output = Service(settings, print_note), _Output(alarms_only=options.quiet)
-    endpoint = None
+    with notes_aside():
+        _serve(settings, options.quiet)
+    return None
+
+
+def _serve(settings: ServiceSettings, quiet: bool) -> None:
+    from armload.service import Endpoint, Service
+
+    service = Service(settings, print_note)
+    output, endpoint = _Output(quiet, service.stop), None
     ends = [signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # else it is to outlive its terminal (nohup)
         ends.append(signal.SIGHUP)
@@ -113,7 +120,6 @@ def run(options: argparse.Namespace) -> int | None:
                 endpoint = Endpoint(service, settings.host or _HERE, settings.port, settings.token)
                 count = len(settings.arms)
                 print_note(f"{count} arm{'s' if count > 1 else ''}: {endpoint.url}/arms")
-            output.start(service.stop)
             service.run(settings.duration)
     finally:
         if endpoint is not None:
@@ -124,7 +130,6 @@ def run(options: argparse.Namespace) -> int | None:
         raise BrokenPipeError
     if service.error is not None:
         raise UsageError(service.error)
-    return None
 
 
 def settings_of(options: argparse.Namespace) -> ServiceSettings:
@@ -156,55 +161,43 @@ def settings_of(options: argparse.Namespace) -> ServiceSettings:
 
 
 class _Output:
-    """Lines on stdout from a thread of its own: who reads slowly loses the oldest lines, and delays nobody.
+    """Lines on stdout: while they cannot be written they are lost, and the service goes on.
 
-    While they cannot be written they are lost, and the service goes on; where nobody reads them any more, it ends.
+    Args:
+        alarms_only: other lines are left out. stop: called when nobody reads any more.
+
+    Attributes:
+        broken: whether that is so.
     """
 
-    def __init__(self, alarms_only: bool, most: int = 1000) -> None:
+    def __init__(self, alarms_only: bool, stop: Callable[[], None]) -> None:
         self.broken = False
-        self._alarms_only = alarms_only
-        self._lines: queue.Queue[dict[str, Any] | None] = queue.Queue(most)
-        self._thread: threading.Thread | None = None
+        self._alarms_only, self._stop = alarms_only, stop
         self._failed: str | None = None  # why the last line could not be written
+        self._lines = Aside(self._write)
 
     def put(self, line: dict[str, Any]) -> None:
-        if self._alarms_only and "alarm" not in line:
-            return None
-        while True:
-            try:
-                return self._lines.put_nowait(line)
-            except queue.Full:
-                try:
-                    self._lines.get_nowait()
-                except queue.Empty:
-                    continue
-
-    def start(self, stop: Callable[[], None]) -> None:
-        def write() -> None:
-            while (line := self._lines.get()) is not None:
-                try:
-                    sys.stdout.write(json.dumps(line, allow_nan=False) + "\n")
-                    sys.stdout.flush()
-                    failed = None
-                except BrokenPipeError:
-                    self.broken = True
-                    stop()
-                    return
-                except OSError as error:  # a full disk: what reads the endpoint, and alarms, go on
-                    failed = error.strerror or str(error)
-                if failed != self._failed:
-                    print_note("lines are written again" if failed is None else f"lines cannot be written: {failed}")
-                self._failed = failed
-
-        self._thread = threading.Thread(target=write, daemon=True)
-        self._thread.start()
+        if "alarm" in line or not self._alarms_only:
+            self._lines.put(line)
 
     def close(self) -> None:
-        if self._thread is not None and not self.broken:
-            if self._lines.full():
-                self._lines.get_nowait()
-            self._lines.put_nowait(None)
-            self._thread.join(2.0)
+        self._lines.close(2.0)
         if self._failed is not None:
             drop_unwritten()  # said already, and no error of the service
+
+    def _write(self, line: dict[str, Any]) -> None:
+        if self.broken:
+            return
+        try:
+            sys.stdout.write(json.dumps(line, allow_nan=False) + "\n")
+            sys.stdout.flush()
+            failed = None
+        except BrokenPipeError:
+            self.broken = True
+            self._stop()
+            return
+        except OSError as error:  # a full disk: what reads the endpoint, and alarms, go on
+            failed = error.strerror or str(error)
+        if failed != self._failed:
+            print_note("lines are written again" if failed is None else f"lines cannot be written: {failed}")
+        self._failed = failed
