@@ -225,6 +225,22 @@ def test_a_drawing_of_which_nobody_says_how_well_it_is_known_is_refused(tray, bo
         identify(log, panda, tare=tare, body=body)
 
 
+@pytest.mark.parametrize(
+    "family", ["nothing", "anything", "tool and payload", "spoons", "", ["wide", "nothing"], ("wide", 3), b"wide", 3]
+)
+def test_python_too_refuses_a_family_that_nobody_may_know(panda, family):
+    with pytest.raises(IdentificationError, match="expected some of boxes, shapes, tools, container, wide, light"):
+        identify("run.csv", panda, family=family)
+
+
+def test_families_are_known_as_one_text_or_one_by_one(panda):
+    for family in ("wide, boxes", ["wide", "boxes"], ("wide", "boxes")):
+        known = known_of(panda, None, None, family=family)
+        assert known is not None
+        assert known.families == ("wide", "boxes")
+    assert known_of(panda, None, None, family=None) is None
+
+
 @pytest.mark.full  # some seconds
 def test_a_family_is_believed_until_the_log_denies_it(tray):
     held, log, tare, panda = tray
@@ -238,7 +254,7 @@ def test_a_family_is_believed_until_the_log_denies_it(tray):
     assert denied.phi == pytest.approx(plain.phi, abs=1e-9)
 
 
-@pytest.mark.parametrize("family", ["nothing", "light"])
+@pytest.mark.parametrize("family", ["container", "light"])
 @pytest.mark.full  # some seconds
 def test_a_family_that_the_log_denies_says_nothing_of_what_is_undetermined_either(tray, family):
     _, log, tare, panda = tray
@@ -285,10 +301,11 @@ def test_a_family_is_for_a_method_that_has_learned_of_it(tray):
     _, log, tare, panda = tray
     with pytest.raises(IdentificationError, match="map-gp has learned of no families"):
         identify(log, panda, tare=tare, family="wide", method="map-gp")
+    prior = HybridIdentifier(panda).model.prior
     with pytest.raises(ModelError, match="no family is called spoons: expected some of"):
-        identify(log, panda, tare=tare, family="spoons")
+        prior.split("spoons")
     with pytest.raises(ModelError, match="all families are named"):
-        identify(log, panda, tare=tare, family=sorted(set(HybridIdentifier(panda).model.prior.families)))
+        prior.split(*prior.families)
 
 
 def test_a_stream_knows_a_drawing_and_a_family_while_something_is_held_and_goes_on_from_its_file(tray, tmp_path):
