@@ -16,6 +16,7 @@ from armload.identification import known_of
 from armload.identification.known_payload import denied_by
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.measuring import Basis
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
 from armload.payloads import Payload, draw_payload, franka_hand, write_payload
@@ -233,12 +234,11 @@ def test_python_too_refuses_a_family_that_nobody_may_know(panda, family):
         identify("run.csv", panda, family=family)
 
 
-def test_families_are_known_as_one_text_or_one_by_one(panda):
-    for family in ("wide, boxes", ["wide", "boxes"], ("wide", "boxes")):
-        known = known_of(panda, None, None, family=family)
-        assert known is not None
-        assert known.families == ("wide", "boxes")
-    assert known_of(panda, None, None, family=None) is None
+@pytest.mark.parametrize("family", ["wide, boxes", ["wide", "boxes"], ("wide", "boxes")])
+def test_families_are_known_as_one_text_or_one_by_one(panda, family):
+    known = Basis(family=family).known(panda)
+    assert known is not None
+    assert known.families == ("wide", "boxes")
 
 
 @pytest.mark.full  # some seconds

@@ -17,6 +17,7 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.found import Asked, found_in
+from armload.identification.known_options import families
 from armload.identification.mounting import likelier_gravity, mounted_otherwise
 from armload.identification.notes import (
     ALLOWED,
@@ -90,7 +91,7 @@ def identify(
     say = progress or (lambda _: None)
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
     drawn = read_payload(body) if isinstance(body, str | Path) else body
-    known = plausible_known(known_of(arm, mass, com, drawn, family), arm)
+    known = plausible_known(known_of(arm, mass, com, drawn, families(family)), arm)
     if tare_age is not None and tare is None:
         raise IdentificationError(
             "tare_age says how old a tare is, but there is no tare: give it, or leave the age out"

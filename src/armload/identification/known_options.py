@@ -45,7 +45,7 @@ class KnownOptions:
         mass = None if self.mass is None else weighed(self.mass)
         com = None if self.com is None else centre(self.com)
         body = None if self.body is None else read_payload(self.body)
-        return plausible_known(known_of(arm, mass, com, body, self.family, if_held=True), arm)
+        return plausible_known(known_of(arm, mass, com, body, families(self.family), if_held=True), arm)
 
 
 def weighed(text: str) -> tuple[float, float]:

@@ -17,7 +17,6 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
-from armload.identification.known_options import families
 from armload.identification.reporting import answered
 from armload.identification.thresholds import DECISIVE, HEAVIEST
 from armload.inertia import HELD, InertialParameters
@@ -106,14 +105,13 @@ def known_of(
     mass: KnownMass | tuple[float, float] | None,
     com: KnownCentre | tuple[ArrayLike, float] | None,
     body: Payload | None = None,
-    family: str | Sequence[str] | None = (),
+    families: Sequence[str] = (),
     if_held: bool = False,
 ) -> Known | None:
     """What is known of a payload; None: nothing. See `Known`; body: with how well it is known.
 
     Raises:
-        IdentificationError: it is not said how well a body is known, or it has no inertia; no family is called so (the
-            learned prior has parts that are nobody's knowledge); and as `Known.of`.
+        IdentificationError: it is not said how well a body is known, or it has no inertia; and as `Known.of`.
     """
     drawn = None
     if body is not None:
@@ -128,7 +126,7 @@ def known_of(
             )
         covariance = _in_frame(arm, std.covariance(body.parameters), body.parameters.frame)
         drawn = KnownBody(arm.in_frame(body.parameters).phi, covariance)
-    return Known.of(mass, com, if_held, drawn, families(family))
+    return Known.of(mass, com, if_held, drawn, families)
 
 
 def plausible_known(known: Known | None, arm: Arm) -> Known | None:
