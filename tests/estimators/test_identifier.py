@@ -10,7 +10,7 @@ import pytest
 
 from armload.arms import arm
 from armload.ensembles import BaggingEnsemble, LearnedIdentifier, save_model
-from armload.errors import ArmloadError
+from armload.errors import ArmloadError, IdentificationError
 from armload.estimators import CommandedLeastSquares, Identifier, RecursiveLeastSquares, Tared
 from armload.identification import METHODS
 from armload.inertia import InertialParameters
@@ -208,6 +208,18 @@ def test_a_sample_of_another_arm_is_refused_and_leaves_no_trace(make, short, joi
     assert last.n_samples == len(samples)
     expected = make().run(short.select(slice(len(samples))))
     np.testing.assert_allclose(identifier.conclude().phi, expected.phi, rtol=0, atol=1e-9)
+
+
+def test_what_is_no_sample_of_arrays_is_refused_in_a_sentence_and_leaves_no_trace(make, short):
+    identifier, untouched = make(), make()
+    first, second = (sample for _, sample in zip(range(2), short, strict=False))
+    identifier.update(first)
+    untouched.update(first)
+    with pytest.raises(IdentificationError, match=r"a tuple was given: expected a Sample\(t, q, dq, tau\)"):
+        identifier.update(tuple(second))
+    with pytest.raises(IdentificationError, match="are list, ndarray, ndarray: expected arrays of NumPy"):
+        identifier.update(second._replace(q=second.q.tolist()))
+    np.testing.assert_array_equal(identifier.update(second).phi, untouched.update(second).phi)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf])

@@ -207,6 +207,14 @@ def test_another_frame_moves_the_same_body(loaded, alone):
     assert np.array(there.com) - here.com == pytest.approx([0, 0, 0.107], abs=0.01)
 
 
+def test_an_age_is_of_a_tare_and_in_seconds(panda, analytic_log):
+    log, tare = analytic_log(panda, BOX), analytic_log(panda, phase=1.0)
+    with pytest.raises(IdentificationError, match="there is no tare"):
+        identify(log, panda, tare_age=86400.0)
+    with pytest.raises(IdentificationError, match="the tare's age is '3d': expected seconds"):
+        identify(log, panda, tare=tare, tare_age="3d")
+
+
 def test_only_measured_torque_at_a_useful_rate_is_taken(panda, analytic_log):
     log = analytic_log(panda, BOX)
     with pytest.raises(IdentificationError, match="external torque"):

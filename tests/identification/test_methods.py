@@ -23,6 +23,7 @@ from armload.estimators import (
 from armload.identification import DEFAULT, LEFT_OUT, METHODS, Method, identify
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
+from armload.online import OnlineIdentifier
 from armload.recording import Recording, write_recording
 from armload.regression import FilteredRegression
 from armload.simulation import simulate
@@ -117,6 +118,13 @@ def test_identify_takes_the_catalogue_s_names_and_answers_with_them(panda, analy
     tared = identify(log, panda, method="wls", tare=analytic_log(panda, rate=50.0))
     assert tared.relative_to == "tare"
     assert tared.mass == pytest.approx(BODY.mass, rel=0.01)
+
+
+def test_an_identifier_of_ones_own_is_no_name_and_is_told_how_it_answers(panda, analytic_log):
+    own, log = WeightedLeastSquares(panda), analytic_log(panda, BODY, duration=1.0, rate=50.0)
+    for refuse in (lambda: identify(log, panda, method=own), lambda: OnlineIdentifier(panda, method=own)):
+        with pytest.raises(IdentificationError, match=r"an identifier of your own answers by its run\(recording\)"):
+            refuse()
 
 
 def test_the_page_is_the_catalogue(capsys):

@@ -8,14 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armload.arms import rated_effort
-from armload.errors import IdentificationError
-from armload.estimators import Estimate, Identifier
+from armload.errors import IdentificationError, InertiaError
+from armload.estimators import Estimate, Identifier, RecursiveLeastSquares
 from armload.inertia import NAMES, InertialParameters
 from armload.lab.evaluation import (
     Comparison,
     EvaluationRun,
     PriorLeastSquares,
     TrainingMean,
+    catalogued,
     compare,
     coverage,
     half_width,
@@ -23,6 +24,7 @@ from armload.lab.evaluation import (
     settling_time,
     spread,
 )
+from armload.payloads import franka_hand
 from armload.posterior.solve import solve
 from armload.recording import Recording
 from armload.regression import Correction, GaussianPrior
@@ -206,6 +208,22 @@ def test_senseless_comparisons_are_refused_in_a_sentence(panda):
         compare(says, [EvaluationRun(still(panda), InertialParameters(CAMERA.phi, "panda_link0"))])
     with pytest.raises(IdentificationError, match="baseline"):
         compare({TrainingMean.name: says["says"]}, [run])
+
+
+@pytest.mark.parametrize("method", [RecursiveLeastSquares, "rls", lambda _: None, 3])
+def test_what_is_no_method_is_refused_by_its_name_and_with_what_one_is(panda, method):
+    with pytest.raises(IdentificationError, match=r"'mine'.*expected an Identifier, such as .*lambda tare: "):
+        compare({"mine": method}, [EvaluationRun(still(panda), CAMERA)])
+
+
+def test_methods_without_names_unknown_names_and_whole_payloads_are_refused_in_a_sentence(panda):
+    says = Says(panda, lambda _: CAMERA.phi)
+    with pytest.raises(IdentificationError, match="expected them by name"):
+        compare(says, [EvaluationRun(still(panda), CAMERA)])
+    with pytest.raises(InertiaError, match="expected InertialParameters; of a Payload give"):
+        compare({"says": says}, [EvaluationRun(still(panda), franka_hand())])
+    with pytest.raises(IdentificationError, match="unknown method 'nope, with tare': expected one of hybrid, map-gp"):
+        catalogued(panda, "rls", "nope, with tare")
 
 
 # ---------------------------------------------------------------------------- tables and JSON

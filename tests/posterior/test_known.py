@@ -16,6 +16,7 @@ from armload.identification import known_of
 from armload.identification.known_payload import denied_by
 from armload.inertia import HELD, Z95, InertialParameters
 from armload.lab.episodes import draw_episodes, simulate_episodes
+from armload.measuring import Basis
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
 from armload.payloads import Payload, draw_payload, franka_hand, write_payload
@@ -225,6 +226,21 @@ def test_a_drawing_of_which_nobody_says_how_well_it_is_known_is_refused(tray, bo
         identify(log, panda, tare=tare, body=body)
 
 
+@pytest.mark.parametrize(
+    "family", ["nothing", "anything", "tool and payload", "spoons", "", ["wide", "nothing"], ("wide", 3), b"wide", 3]
+)
+def test_python_too_refuses_a_family_that_nobody_may_know(panda, family):
+    with pytest.raises(IdentificationError, match="expected some of boxes, shapes, tools, container, wide, light"):
+        identify("run.csv", panda, family=family)
+
+
+@pytest.mark.parametrize("family", ["wide, boxes", ["wide", "boxes"], ("wide", "boxes")])
+def test_families_are_known_as_one_text_or_one_by_one(panda, family):
+    known = Basis(family=family).known(panda)
+    assert known is not None
+    assert known.families == ("wide", "boxes")
+
+
 @pytest.mark.full  # some seconds
 def test_a_family_is_believed_until_the_log_denies_it(tray):
     held, log, tare, panda = tray
@@ -238,7 +254,7 @@ def test_a_family_is_believed_until_the_log_denies_it(tray):
     assert denied.phi == pytest.approx(plain.phi, abs=1e-9)
 
 
-@pytest.mark.parametrize("family", ["nothing", "light"])
+@pytest.mark.parametrize("family", ["container", "light"])
 @pytest.mark.full  # some seconds
 def test_a_family_that_the_log_denies_says_nothing_of_what_is_undetermined_either(tray, family):
     _, log, tare, panda = tray
@@ -285,10 +301,11 @@ def test_a_family_is_for_a_method_that_has_learned_of_it(tray):
     _, log, tare, panda = tray
     with pytest.raises(IdentificationError, match="map-gp has learned of no families"):
         identify(log, panda, tare=tare, family="wide", method="map-gp")
+    prior = HybridIdentifier(panda).model.prior
     with pytest.raises(ModelError, match="no family is called spoons: expected some of"):
-        identify(log, panda, tare=tare, family="spoons")
+        prior.split("spoons")
     with pytest.raises(ModelError, match="all families are named"):
-        identify(log, panda, tare=tare, family=sorted(set(HybridIdentifier(panda).model.prior.families)))
+        prior.split(*prior.families)
 
 
 def test_a_stream_knows_a_drawing_and_a_family_while_something_is_held_and_goes_on_from_its_file(tray, tmp_path):

@@ -152,6 +152,36 @@ def test_harmless_variants_of_csv_read_the_same(tmp_path, change):
     assert same(read_recording(tmp_path / "log.csv"), recording)
 
 
+DATES = np.datetime64("2026-03-02T10:00:00") + np.arange(5) * np.timedelta64(4, "ms")
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("t", DATES, "t is datetime64"),
+        ("t", DATES - DATES[0], "t is timedelta64"),
+        ("q", np.full((5, 2), 1j), "q is complex128"),
+        ("q", [[0.0, 1.0]] * 4 + [[0.0]], "q is a list"),
+        ("tau", "run.csv", "tau is a str"),
+    ],
+)
+def test_arrays_of_no_real_numbers_are_refused_and_not_cast(field, value, said):
+    """Nanoseconds would pass for seconds, and an imaginary part would be lost."""
+    whole = log()
+    arrays = {name: getattr(whole, name) for name in ("t", "q", "dq", "tau")}
+    with pytest.raises(RecordingError, match=f"{said}.*expected real numbers"):
+        Recording(**arrays | {field: value})
+    advised = (DATES - DATES[0]) / np.timedelta64(1, "s")
+    np.testing.assert_allclose(Recording(**arrays | {"t": advised}).t, whole.t, atol=1e-12)
+
+
+@pytest.mark.parametrize("names", [("a",), ("a", "b", "c"), "ab"])
+def test_joint_names_are_as_many_as_joints(names):
+    with pytest.raises(RecordingError, match="expected one for each of 2 joints"):
+        log(joint_names=names)
+    assert log(joint_names=["a", "b"]).joint_names == ("a", "b")
+
+
 def test_an_arm_that_is_only_named_is_refused_in_a_sentence(tmp_path):
     write_recording(tmp_path / "log.csv", log(n=2, rows=8))
     with pytest.raises(RecordingError, match=r"is given as 'panda': expected an Arm, such as armload.arm\('panda'\)"):

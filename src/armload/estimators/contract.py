@@ -139,7 +139,8 @@ class Identifier(ABC):
         """Take one sample (t, q, dq, tau) and return the estimate so far.
 
         Raises:
-            IdentificationError: it is of another number of joints, or holds a number that is not finite.
+            IdentificationError: it is no `Sample` of arrays, of another number of joints, or holds a number that is not
+                finite.
         """
         self._check_sample(sample)
         self._now = float(sample.t)
@@ -202,7 +203,12 @@ class Identifier(ABC):
 
     def _check_size(self, sample: Sample) -> None:
         """Compiled code reads as many numbers as the arm has joints."""
+        if not isinstance(sample, Sample):
+            raise IdentificationError(f"a {type(sample).__name__} was given: expected a Sample(t, q, dq, tau)")
         _, q, dq, tau = sample
+        if not (isinstance(q, np.ndarray) and isinstance(dq, np.ndarray) and isinstance(tau, np.ndarray)):
+            kinds = ", ".join(type(x).__name__ for x in (q, dq, tau))
+            raise IdentificationError(f"q, dq and tau of a sample are {kinds}: expected arrays of NumPy")
         if not q.shape == dq.shape == tau.shape == (self.arm.n,):
             raise IdentificationError(
                 f"a sample has q, dq and tau of shapes {q.shape}, {dq.shape} and {tau.shape}: expected {self.arm.n} "

@@ -69,9 +69,9 @@ class JointLeastSquares(Identifier):
 
     def update(self, sample: Sample) -> Estimate:
         """Take one sample (t, q, dq, tau) and return the estimate so far, at most `refresh` old."""
+        self._check_sample(sample)
         if sample.t - self._solved_at >= self.refresh:
             return super().update(sample)
-        self._check_sample(sample)
         self._take(np.array([sample.t]), sample.q[None], sample.dq[None], sample.tau[None])
         return self._last(sample.t)
 

@@ -54,6 +54,11 @@ def choose(
     Raises:
         ArmloadError: an unknown method, a model that is missing or of another arm, or a tare the method has no use for.
     """
+    if isinstance(method, Identifier):
+        raise IdentificationError(
+            f"the method is {method!r}: expected a name or a model's file; an identifier of your own answers by "
+            "its run(recording), and armload.lab.evaluation.compare sets it beside others"
+        )
     choice = _chosen(arm, tare, default_for(arm) if method is None else str(method), live, profile)
     if live and isinstance(choice.identifier, PosteriorLeastSquares):
         choice.identifier.live = True

@@ -17,6 +17,7 @@ from armload.errors import IdentificationError
 from armload.identification.answer import Identification, Segment
 from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.found import Asked, found_in
+from armload.identification.known_options import families
 from armload.identification.mounting import likelier_gravity, mounted_otherwise
 from armload.identification.notes import (
     ALLOWED,
@@ -56,7 +57,7 @@ def identify(
     mass: KnownMass | tuple[float, float] | None = None,
     com: KnownCentre | tuple[ArrayLike, float] | None = None,
     body: Payload | str | Path | None = None,
-    family: str | Sequence[str] = (),
+    family: str | Sequence[str] | None = None,
     profile: Profile | str | Path | None = None,
     method: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
@@ -77,7 +78,7 @@ def identify(
         com: its centre of mass (3,), where that is known, in the arm's payload frame, and its standard deviation along
             each axis [m].
         body: all that is known of it, as of a drawing, with how well (`Payload.uncertainty`), or the path of its file.
-        family: what kind it is of, by the names of the learned prior (`MixturePrior.families`), or several.
+        family: what kind it is of, or several: "boxes", "shapes", "tools", "container", "wide" or "light".
         profile: what was learned of this arm from many logs (`armload.posterior.learn_profile`), or the path of its
             file; the answer is what was added since. With a tare too, the tare is of the recording's own day.
         method: a name in `armload.METHODS`, or the path of a trained model; None: the most trustworthy for the arm,
@@ -90,8 +91,11 @@ def identify(
     say = progress or (lambda _: None)
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
     drawn = read_payload(body) if isinstance(body, str | Path) else body
-    families = (family,) if isinstance(family, str) else tuple(family)
-    known = plausible_known(known_of(arm, mass, com, drawn, families), arm)
+    known = plausible_known(known_of(arm, mass, com, drawn, families(family)), arm)
+    if tare_age is not None and tare is None:
+        raise IdentificationError(
+            "tare_age says how old a tare is, but there is no tare: give it, or leave the age out"
+        )
     recording = recording if isinstance(recording, Recording) else read_recording(recording, arm)
     tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
     read = recording.notes if tare is None else of_readers(recording, tare)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -92,22 +93,23 @@ def centre(text: str) -> tuple[tuple[float, ...], float]:
     return com, std
 
 
-def families(text: str | None) -> tuple[str, ...]:
-    """Names of families.
+def families(given: str | Sequence[str] | None) -> tuple[str, ...]:
+    """Names of families, as a text or one by one.
 
-    >>> families("wide, boxes"), families(None)
-    (('wide', 'boxes'), ())
+    >>> families("wide, boxes"), families(["wide"]), families(None)
+    (('wide', 'boxes'), ('wide',), ())
 
     Raises:
         IdentificationError: no family is called so.
     """
-    if text is None:
-        return ()
-    names = tuple(name.strip() for name in text.split(","))
+    names = given.split(",") if isinstance(given, str) else () if given is None else given
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise IdentificationError(f"the family is {given!r}: expected some of {', '.join(FAMILIES)}, as texts")
+    names = tuple(name.strip() for name in names)
     stray = sorted(set(names) - set(FAMILIES))
     if stray:
         raise IdentificationError(
-            f"no family is called {', '.join(stray) if all(stray) else repr(text)}: expected some of "
+            f"no family is called {', '.join(stray) if all(stray) else repr(given)}: expected some of "
             f"{', '.join(FAMILIES)}, separated by commas; where none is known, leave it out"
         )
     return names

@@ -71,6 +71,8 @@ def checked_age(seconds: float) -> float:
     Raises:
         IdentificationError: it is none.
     """
+    if isinstance(seconds, str):
+        raise IdentificationError(f"the tare's age is {seconds!r}: expected seconds, such as 86400.0 for a day")
     if not (np.isfinite(seconds) and seconds >= 0.0):
         raise IdentificationError(f"the tare's age is {seconds:g} s: expected a time of 0 or more")
     return seconds

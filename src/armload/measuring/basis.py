@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from armload.arms import Arm
 from armload.identification import METHODS, choose, known_of, plausible_known
+from armload.identification.known_options import families
 from armload.identification.known_payload import know, of_no_use_to
 from armload.payloads import Payload
 from armload.posterior import Known, KnownCentre, KnownMass, Profile
@@ -22,7 +24,7 @@ class Basis:
         tare_age: how old that is [s]; None: by the logs' clocks.
         profile: what was learned of this arm from many logs.
         mass: of the payload, where it was weighed. com: its centre of mass, where that is known.
-        body: all of it, as of a drawing, with how well. family: what kind it is of, by the learned prior's names.
+        body: all of it, as of a drawing, with how well. family: what kind it is of, as `--family` names them.
         method: of the identification.
     """
 
@@ -32,7 +34,7 @@ class Basis:
     mass: KnownMass | None = None
     com: KnownCentre | None = None
     body: Payload | None = None
-    family: tuple[str, ...] = ()
+    family: str | Sequence[str] = ()
     method: str | Path | None = None
 
     @property
@@ -51,7 +53,7 @@ class Basis:
             IdentificationError: it cannot, the arm cannot hold so much, or what is known cannot be weighed against a
                 log. ModelError: no such family was learned, or the method is a model of another arm.
         """
-        known = plausible_known(known_of(arm, self.mass, self.com, self.body, self.family), arm)
+        known = plausible_known(known_of(arm, self.mass, self.com, self.body, families(self.family)), arm)
         method = METHODS.get(str(self.method))
         if self.tare is None and method is not None and method.needs == "tare":  # of which the empty run will be one
             if known is not None:

@@ -8,7 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import RecordingError
 
@@ -55,8 +55,8 @@ class Recording:
             (`with_gravity`); None: tau is as the source has it.
 
     Raises:
-        RecordingError: wrong shapes, a number that is not finite, times out of order; the message names row and column
-            (rows counted from 0, as in the arrays).
+        RecordingError: no numbers, wrong shapes, a number that is not finite, times out of order; the message names row
+            and column (rows counted from 0, as in the arrays).
     """
 
     t: NDArray[np.float64]
@@ -72,7 +72,7 @@ class Recording:
 
     def __post_init__(self) -> None:
         for name in ("t", "q", "dq", "tau"):
-            value = np.array(getattr(self, name), dtype=float, order="C")  # its own copy: the caller's stays writable
+            value = _numbers(getattr(self, name), f"{self.source}: {name}")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         if self.channel not in CHANNELS:
@@ -85,6 +85,12 @@ class Recording:
                 raise RecordingError(
                     f"{self.source}: {name} has shape {value.shape}, expected {(len(self.t), self.q.shape[1])}"
                 )
+        if self.joint_names is not None:
+            if isinstance(self.joint_names, str) or len(self.joint_names) != self.n:
+                raise RecordingError(
+                    f"{self.source}: the joint names are {self.joint_names!r}: expected one for each of {self.n} joints"
+                )
+            object.__setattr__(self, "joint_names", tuple(self.joint_names))
         if len(self.t) < 2:
             raise RecordingError(f"{self.source} holds {len(self.t)} sample(s): expected at least 2")
         for name in ("t", "q", "dq", "tau"):
@@ -159,3 +165,22 @@ class Recording:
     def select(self, rows: NDArray | slice) -> Recording:
         """The samples at the given rows (index array, mask or slice)."""
         return replace(self, t=self.t[rows], q=self.q[rows], dq=self.dq[rows], tau=self.tau[rows])
+
+
+def _numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """A copy of the values as floats: the caller's stays writable. Dates and complex numbers would be cast in silence.
+
+    Raises:
+        RecordingError: they are no numbers.
+    """
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind not in "cMm":
+            return np.array(given, dtype=float, order="C")
+        held = f"{given.dtype}"
+    except (TypeError, ValueError):
+        held = f"a {type(values).__name__} of something else"
+    raise RecordingError(
+        f"{what} is {held}: expected real numbers, as many in each row; of dates the seconds since the first, "
+        "(dates - dates[0]) / np.timedelta64(1, 's')"
+    ) from None

@@ -89,6 +89,8 @@ def page() -> str:
         "",
         *(f"- **{name}**: {text}." for name, text in _TARES.items()),
         "",
+        *_OWN.splitlines(),
+        "",
         "## Left out",
         "",
         "What the paper's related work names (its reference numbers) and armload does not build:",
@@ -105,3 +107,49 @@ _TARES = {
     "same motion": "the tare must follow the run's own motion; it is subtracted sample by sample",
     "none": "the method cannot use one",
 }
+_OWN = """\
+## Your own
+
+A method is an `Identifier`: it says how to forget (`reset`), how to take the next N samples (`_take`), and what
+follows from all so far (`_estimate`). Streams (`update`), logs (`run`), a tare (`Tared`) and the comparison with others
+follow. This one weighs each joint by its rated torque:
+
+```python
+import numpy as np
+from armload import RecursiveLeastSquares, arm, simulate, taie2024
+from armload.estimators import Estimate, Identifier
+from armload.lab.evaluation import EvaluationRun, compare
+from armload.payloads import test_payload
+from armload.regression import FilteredRegression
+
+
+class RatedLeastSquares(Identifier):
+    name = "rated"
+
+    def __init__(self, arm):
+        self.arm, self.rows, self.weights = arm, FilteredRegression(arm), 1.0 / arm.limits.effort**2
+        self.reset()
+
+    def reset(self):
+        self.rows.reset()
+        self.A, self.b, self.count = 1e-9 * np.eye(10), np.zeros(10), 0
+
+    def _take(self, t, q, dq, tau):  # (N,) and three times (N, n)
+        r, W = self.rows(t, q, dq, tau)  # r = W·phi, without accelerations
+        self.A += np.einsum("j,kja,kjb->ab", self.weights, W, W)
+        self.b += np.einsum("j,kja,kj->a", self.weights, W, r)
+        self.count += len(t)
+
+    def _estimate(self, t):
+        covariance = np.linalg.inv(self.A)
+        return Estimate(t, covariance @ self.b, covariance, self.count, self.arm.frame)
+
+
+panda = arm("panda")
+log = simulate(panda, taie2024(), test_payload(), rate=100.0)  # or: read_recording("run.csv", panda)
+methods = {"rated": RatedLeastSquares(panda), "rls": RecursiveLeastSquares(panda)}
+print(compare(methods, [EvaluationRun(log, test_payload().parameters)]))
+```
+
+`armload identify --method` and `armload benchmark` know the names above alone. A method gets one by a row in
+`identification/methods.py`."""

@@ -14,7 +14,7 @@ from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier, Tared
 from armload.identification import METHODS
-from armload.inertia import InertialParameters
+from armload.inertia import InertialParameters, parameters_only
 from armload.lab.evaluation.baselines import PriorLeastSquares, TrainingMean
 from armload.lab.evaluation.comparison import Comparison
 from armload.recording import Recording
@@ -75,9 +75,13 @@ def compare(
         progress: called with a few words on what is being done.
 
     Raises:
-        IdentificationError: nothing to compare, times that no recording has, or a truth about another frame.
+        IdentificationError: nothing to compare, times that no recording has, a truth about another frame, or what is no
+            method.
+        InertiaError: a truth that is no `InertialParameters`, such as a whole payload.
         ArmloadError: what a method says when it refuses a recording.
     """
+    if not isinstance(identifiers, Mapping):
+        raise IdentificationError(f"the methods are {identifiers!r}: expected them by name, such as {{'mine': method}}")
     if not identifiers or not runs:
         raise IdentificationError("nothing to compare: expected at least one method and one run")
     shortest = min(run.recording.duration for run in runs)
@@ -88,7 +92,7 @@ def compare(
         )
     arm = _arm(identifiers, runs)
     for run in runs:
-        if run.truth.frame not in (None, arm.frame):
+        if parameters_only(run.truth).frame not in (None, arm.frame):
             raise IdentificationError(
                 f"the truth of {run.label!r} is about {run.truth.frame!r}, the estimates about {arm.frame!r}: "
                 "move it with arm.in_frame(truth)"
@@ -103,7 +107,7 @@ def compare(
         for r, run in enumerate(runs):
             if progress is not None:
                 progress(f"{name}: {run.label}")
-            identifier = _prepare(method, run.tare)
+            identifier = _prepare(name, method, run.tare)
             if _is_average(method if isinstance(method, Identifier) else identifier):
                 averaged.add(name)
             _warm_up(identifier, run.recording)
@@ -135,17 +139,28 @@ def compare(
 
 
 def catalogued(arm: Arm, *names: str) -> dict[str, Method]:
-    """Methods of the catalogue by name: NAME ignores a run's tare, `NAME, with tare` uses it as the method does."""
+    """Methods of the catalogue by name: NAME ignores a run's tare, `NAME, with tare` uses it as the method does.
+
+    Raises:
+        IdentificationError: no method is called so.
+    """
 
     def one(name: str) -> Method:
-        method = METHODS[name.removesuffix(WITH_TARE)]
+        method = METHODS.get(name.removesuffix(WITH_TARE))
+        if method is None:
+            raise IdentificationError(
+                f"unknown method {name!r}: expected one of {', '.join(METHODS)}, or one{WITH_TARE}"
+            )
         return partial(method.make, arm) if name.endswith(WITH_TARE) else lambda _: method.make(arm)
 
     return {name: one(name) for name in names}
 
 
 def _arm(identifiers: Mapping[str, Method], runs: Sequence[EvaluationRun]) -> Arm:
-    found = [m.arm if isinstance(m, Identifier) else m(runs[0].tare).arm for m in identifiers.values()]
+    found = [
+        (method if isinstance(method, Identifier) else _prepare(name, method, runs[0].tare)).arm
+        for name, method in identifiers.items()
+    ]
     if any((a.name, a.frame) != (found[0].name, found[0].frame) for a in found):
         raise IdentificationError("the methods are not all of the same arm and frame: their errors cannot be compared")
     return found[0]
@@ -180,11 +195,17 @@ def _with_baselines(
     return methods, tuple(baselines)
 
 
-def _prepare(method: Method, tare: Recording | None) -> Identifier:
+def _prepare(name: str, method: Method, tare: Recording | None) -> Identifier:
     """The identifier for a run, made to take account of the run's tare."""
-    if not isinstance(method, Identifier):
-        return method(tare)
-    return method if tare is None or isinstance(method, TrainingMean) else Tared(method, tare)
+    if isinstance(method, Identifier):
+        return method if tare is None or isinstance(method, TrainingMean) else Tared(method, tare)
+    made = None if isinstance(method, type) or not callable(method) else method(tare)
+    if not isinstance(made, Identifier):
+        raise IdentificationError(
+            f"the method {name!r} is {method!r}: expected an Identifier, such as RecursiveLeastSquares(arm), or a "
+            "function that makes one of a run's tare, such as lambda tare: HybridIdentifier(arm, tare)"
+        )
+    return made
 
 
 def _warm_up(identifier: Identifier, recording: Recording) -> None:
