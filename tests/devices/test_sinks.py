@@ -31,13 +31,13 @@ from armload.devices import (
 from armload.devices.franka import writer as franka_robot
 from armload.devices.franka.form import desk_text
 from armload.devices.kuka.form import kuka_load
-from armload.devices.load_remarks import HARDLY_KNOWN
+from armload.devices.load_remarks import HARDLY_KNOWN, leaning
 from armload.devices.ur import writer as ur_robot
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
 from armload.identification import Identification
 from armload.identification.answer import Segment
 from armload.identification.intervals import intervals
-from armload.inertia import InertialParameters, is_consistent
+from armload.inertia import NAMES, InertialParameters, is_consistent
 from armload.payloads import INERTIA_ASSUMED, franka_hand, hand_on, random_payload, test_payload, write_payload
 
 FLANGES = {
@@ -560,6 +560,31 @@ def test_a_load_is_not_moved_over_a_joint(frame):
         check_writable(Load(skew_body()), panda, moving=False, write=True, flange=frame)
     with pytest.raises(ArmError, match="unknown frame 'nowhere'"):
         check_writable(Load(skew_body("nowhere")), panda, moving=False, write=True, flange="nowhere")
+
+
+def test_a_load_that_is_moved_says_of_the_new_axes_what_was_not_measured():
+    turned = (  # its y axis is the flange's −x
+        '<link name="turned"/><joint name="turn" type="fixed"><origin xyz="0 0 0" rpy="0 0 1.5707963267948966"/>'
+        '<parent link="panda_link8"/><child link="turned"/></joint></robot>'
+    )
+    cell = Arm("cell", arm("panda").urdf.replace("</robot>", turned), "turned")
+    std = np.arange(1.0, 11.0)
+    known = tuple(name not in ("m·ry", "Ixx") for name in NAMES)
+    load = Load(skew_body("turned"), known, std=std, remarks=leaning(known, [name == "Iyy" for name in NAMES]))
+    there = load.about("panda_link8", cell)
+    assert there.undetermined == ("m·rx", "Iyy")
+    assert there.remarks == (f"{load.remarks[0]}, in the axes of turned",)
+    assert there.without_inertia().remarks == ()
+    # m, then x and y exchanged, and so Ixx and Iyy, Ixz and Iyz
+    np.testing.assert_allclose(there.std, std[[0, 2, 1, 3, 7, 5, 8, 4, 6, 9]], rtol=1e-6)
+    assert load.about("turned", cell).undetermined == ("m·ry", "Ixx")
+
+
+def test_a_load_that_is_moved_says_still_that_nothing_seems_to_be_held():
+    light = InertialParameters(0.01 * skew_body().phi, "panda_link7")
+    load = Load.of(identification(light)).about("panda_link8", arm("panda"))
+    assert load.seems_nothing
+    assert "nothing seems to be held" in export_load(load, "franka")
 
 
 def test_forms_that_name_the_frame_need_it():

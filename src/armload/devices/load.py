@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.devices.load_remarks import NOTHING_HELD, assumed, doubted, leaning, loose, of_a_part, without_moments
+from armload.arms import from_frame
+from armload.devices.load_remarks import (
+    NOTHING_HELD,
+    assumed,
+    doubted,
+    leaning,
+    loose,
+    of_a_part,
+    of_axes,
+    without_moments,
+)
 from armload.errors import SinkError
 from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
@@ -21,6 +31,7 @@ if TYPE_CHECKING:
     from armload.online import OnlineEstimate
 
 _KNOWN = (True,) * 10
+_NONE = 1e-6  # of a frame's turn and place: rounding
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 _MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
 
@@ -124,10 +135,20 @@ class Load:
         return self._changed(self.parameters + other, "arm")
 
     def about(self, frame: str | None, arm: Arm | None = None) -> Load:
-        """The same load about another frame fixed to the arm's last moving link; see `about`."""
+        """The same load about another frame fixed to the arm's last moving link; see `about`.
+
+        What was not measured stays so: a parameter counts as measured where all are that it is computed from. Its
+        deviation is that of errors which are independent about the old frame.
+        """
         moved = about(self.parameters, frame, arm)
-        same = self.frame in (None, frame) or frame is None
-        return replace(self, parameters=moved, std=self.std if same else None)
+        if arm is None or frame is None or self.frame in (None, frame):
+            return replace(self, parameters=moved)
+        T = from_frame(replace(arm, frame=frame, attached=None), str(self.frame))
+        known = tuple(all(np.array(self.determined)[np.abs(row) > _NONE]) for row in T)
+        std = None if self.std is None else np.sqrt(T**2 @ self.std**2)
+        turned = bool(np.any(np.abs(T[1:4, 1:4] - np.eye(3)) > _NONE))
+        remarks = tuple(of_axes(remark, str(self.frame)) if turned else remark for remark in self.remarks)
+        return replace(self, parameters=moved, determined=known, std=std, remarks=remarks)
 
     def as_body(self) -> Load:
         """The nearest load that a body can have, in units of its standard deviations; itself where it is one.

@@ -141,13 +141,12 @@ def write(
     from armload.devices import FORMS as FORMS_OF
     from armload.devices.load_remarks import HARDLY_KNOWN, NOTHING_HELD
 
-    nothing = load.seems_nothing
-    load = load.about(frame_for(load, to, arm) if frame is None else frame, arm)
-    elsewhere = to in CONTROLLERS and load.frame is not None and not on_flange(load.frame, to, arm)
+    whole = load.as_body()  # about its own frame, where its error bars are
+    nothing, body = load.seems_nothing, whole.about(frame_for(load, to, arm) if frame is None else frame, arm)
+    elsewhere = to in CONTROLLERS and body.frame is not None and not on_flange(body.frame, to, arm)
     if elsewhere and frame is None:
         raise no_flange(load, arm)
-    body = load.as_body()
-    if body is not load:
+    if whole is not load:
         print_note(
             "no body has the parameters that are left: the nearest one is written, with a mass of "
             f"{body.parameters.mass:.4f} kg instead of {load.parameters.mass:.4f} kg"
@@ -156,7 +155,7 @@ def write(
     if nothing:
         print_note(NOTHING_HELD)
     if elsewhere:
-        print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
+        print_note(f"a controller counts from its flange; these numbers are about {body.frame}, as was asked for")
     numbers = [note for note in _on_numbers(FORMS_OF[to].held_of(body)) if not earlier or note.startswith(HARDLY_KNOWN)]
     for note in (*earlier, *doubts, *numbers, *_on_use(body, to, added)):
         print_note(note)
