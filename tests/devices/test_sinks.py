@@ -519,6 +519,21 @@ def test_what_is_left_within_the_error_bars_of_a_body_is_left():
     assert not (Load(measured, relative_to="arm") - hand).consistent  # as_body may mend it
 
 
+def test_moments_that_a_part_leaves_smaller_than_their_intervals_are_said_to_be_hardly_known(tmp_path):
+    hand = franka_hand().parameters
+    whole = skew_body() + hand
+    half = 0.5 * np.diag(INERTIA) * (1.1, 0.9, 1.1)  # of the interval of each moment
+    assert np.all(np.diag(whole.inertia_com) > 2 * half)
+    low, high = (whole.inertia_com + sign * np.diag(half) for sign in (-1, 1))
+    result = replace(identification(whole), inertia_com_low=low, inertia_com_high=high)
+    (tmp_path / "held.json").write_text(json.dumps(result.to_dict()))
+    for load in (Load.of(result), read_load(tmp_path / "held.json")):
+        assert HARDLY_KNOWN not in export_load(load, "franka")
+        left = load - hand
+        assert f"{HARDLY_KNOWN}: Ixx, Izz" in export_load(left, "franka")
+        assert HARDLY_KNOWN not in export_load(left + hand, "franka")
+
+
 def test_what_no_body_has_is_not_exported_and_the_nearest_body_is():
     phi = skew_body().phi.copy()
     phi[4:] *= 0.1  # less than the mass at its centre needs

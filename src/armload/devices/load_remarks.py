@@ -64,11 +64,11 @@ def leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple
     return (f"{_LEANING}: {', '.join(names)}",) if names else ()
 
 
-def loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -> tuple[str, ...]:
+def loose(value: NDArray, widths: NDArray | None, known: Sequence[bool]) -> tuple[str, ...]:
     """A remark on moments of inertia about the centre of mass (3,) that are hardly known, though determined.
 
     Hardly: the interval is wider than the value, which a controller takes for exact.
     """
-    which = (np.shape(value) == np.shape(low) == np.shape(high) == (3,)) and (high - low > value)
+    which = widths is not None and np.shape(value) == np.shape(widths) == (3,) and (widths > value)
     names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
     return (f"{HARDLY_KNOWN}: {', '.join(names)}",) if names else ()
