@@ -31,13 +31,13 @@ from armload.devices import (
 from armload.devices.franka import writer as franka_robot
 from armload.devices.franka.form import desk_text
 from armload.devices.kuka.form import kuka_load
-from armload.devices.load_remarks import HARDLY_KNOWN
+from armload.devices.load_remarks import HARDLY_KNOWN, leaning
 from armload.devices.ur import writer as ur_robot
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, SinkError
 from armload.identification import Identification
 from armload.identification.answer import Segment
 from armload.identification.intervals import intervals
-from armload.inertia import InertialParameters, is_consistent
+from armload.inertia import NAMES, InertialParameters, is_consistent
 from armload.payloads import INERTIA_ASSUMED, franka_hand, hand_on, random_payload, test_payload, write_payload
 
 FLANGES = {
@@ -519,6 +519,21 @@ def test_what_is_left_within_the_error_bars_of_a_body_is_left():
     assert not (Load(measured, relative_to="arm") - hand).consistent  # as_body may mend it
 
 
+def test_moments_that_a_part_leaves_smaller_than_their_intervals_are_said_to_be_hardly_known(tmp_path):
+    hand = franka_hand().parameters
+    whole = skew_body() + hand
+    half = 0.5 * np.diag(INERTIA) * (1.1, 0.9, 1.1)  # of the interval of each moment
+    assert np.all(np.diag(whole.inertia_com) > 2 * half)
+    low, high = (whole.inertia_com + sign * np.diag(half) for sign in (-1, 1))
+    result = replace(identification(whole), inertia_com_low=low, inertia_com_high=high)
+    (tmp_path / "held.json").write_text(json.dumps(result.to_dict()))
+    for load in (Load.of(result), read_load(tmp_path / "held.json")):
+        assert HARDLY_KNOWN not in export_load(load, "franka")
+        left = load - hand
+        assert f"{HARDLY_KNOWN}: Ixx, Izz" in export_load(left, "franka")
+        assert HARDLY_KNOWN not in export_load(left + hand, "franka")
+
+
 def test_what_no_body_has_is_not_exported_and_the_nearest_body_is():
     phi = skew_body().phi.copy()
     phi[4:] *= 0.1  # less than the mass at its centre needs
@@ -560,6 +575,31 @@ def test_a_load_is_not_moved_over_a_joint(frame):
         check_writable(Load(skew_body()), panda, moving=False, write=True, flange=frame)
     with pytest.raises(ArmError, match="unknown frame 'nowhere'"):
         check_writable(Load(skew_body("nowhere")), panda, moving=False, write=True, flange="nowhere")
+
+
+def test_a_load_that_is_moved_says_of_the_new_axes_what_was_not_measured():
+    turned = (  # its y axis is the flange's −x
+        '<link name="turned"/><joint name="turn" type="fixed"><origin xyz="0 0 0" rpy="0 0 1.5707963267948966"/>'
+        '<parent link="panda_link8"/><child link="turned"/></joint></robot>'
+    )
+    cell = Arm("cell", arm("panda").urdf.replace("</robot>", turned), "turned")
+    std = np.arange(1.0, 11.0)
+    known = tuple(name not in ("m·ry", "Ixx") for name in NAMES)
+    load = Load(skew_body("turned"), known, std=std, remarks=leaning(known, [name == "Iyy" for name in NAMES]))
+    there = load.about("panda_link8", cell)
+    assert there.undetermined == ("m·rx", "Iyy")
+    assert there.remarks == (f"{load.remarks[0]}, in the axes of turned",)
+    assert there.without_inertia().remarks == ()
+    # m, then x and y exchanged, and so Ixx and Iyy, Ixz and Iyz
+    np.testing.assert_allclose(there.std, std[[0, 2, 1, 3, 7, 5, 8, 4, 6, 9]], rtol=1e-6)
+    assert load.about("turned", cell).undetermined == ("m·ry", "Ixx")
+
+
+def test_a_load_that_is_moved_says_still_that_nothing_seems_to_be_held():
+    light = InertialParameters(0.01 * skew_body().phi, "panda_link7")
+    load = Load.of(identification(light)).about("panda_link8", arm("panda"))
+    assert load.seems_nothing
+    assert "nothing seems to be held" in export_load(load, "franka")
 
 
 def test_forms_that_name_the_frame_need_it():

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armload.arms.facts import ARMS, ArmFacts, Capsule
     from armload.arms.forward import ForwardDerivatives, ForwardDynamics
     from armload.arms.limits import Limits
-    from armload.arms.matching import facts_of, from_frame, link_fingerprint, names_among, prefixed_frame
+    from armload.arms.matching import facts_of, flange_named, from_frame, link_fingerprint, names_among, prefixed_frame
     from armload.arms.model import LINK_SPREAD, Arm
     from armload.arms.regressors import (
         MomentumRegressor,
@@ -40,6 +40,7 @@ __all__ = [
     "NearestCapsules",
     "arm",
     "facts_of",
+    "flange_named",
     "from_frame",
     "full_arm_regressor",
     "leaning_torque",

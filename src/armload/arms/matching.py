@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms.facts import ARMS, ArmFacts
 from armload.arms.model import Arm
+from armload.errors import ArmError
 from armload.inertia import InertialParameters
 
 _TURN = 0.3  # [rad, m] of the first joint, which shows its axis
@@ -37,6 +39,23 @@ def prefixed_frame(arm: Arm, frame: str) -> str | None:
         return frame
     found = [name for name in arm.frames if name.endswith(frame)]
     return found[0] if len(found) == 1 else None
+
+
+def flange_named(arm: Arm, sheets: Iterable[ArmFacts], beside: str | None = None) -> str | None:
+    """What an arm calls its flange: a link that has the name of a sheet's, else one that ends as such flanges do.
+
+    A tool behind the flange does not matter. None: there is none, or there are several.
+
+    Args:
+        sheets: of the arms whose flange it may be.
+        beside: a frame that moves with the flange, where the file has several arms.
+    """
+    sheets = list(sheets)
+    found = [name for name in arm.frames if name.endswith(tuple(facts.flange_ending for facts in sheets))]
+    if beside in arm.frames:
+        found = [name for name in found if _moved_alike(arm, name, str(beside))] or found
+    exact = [name for name in found if name in {facts.flange for facts in sheets}]
+    return next((names[0] for names in (exact, found) if len(names) == 1), None)
 
 
 def from_frame(arm: Arm, frame: str) -> NDArray[np.float64]:
@@ -73,6 +92,16 @@ def names_among(arm: Arm, found: Collection[str]) -> tuple[str, ...] | None:
     facts = facts_of(arm)
     others = () if facts is None else facts.log_names or ()
     return next((names for names in (arm.joint_names, *others) if set(names) <= set(found)), None)
+
+
+def _moved_alike(arm: Arm, one: str, other: str) -> bool:
+    """Whether the same joints move two frames."""
+    try:
+        return (
+            replace(arm, frame=one, attached=None).joint_names == replace(arm, frame=other, attached=None).joint_names
+        )
+    except ArmError:  # no joint moves one of them
+        return False
 
 
 def _poses(arm: Arm, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.devices.load_remarks import NOTHING_HELD, assumed, doubted, leaning, loose, of_a_part, without_moments
+from armload.devices import load_remarks as remarks_on
 from armload.errors import SinkError
 from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from armload.online import OnlineEstimate
 
 _KNOWN = (True,) * 10
+_NONE = 1e-6  # of a frame's turn and place: rounding
 _RELATIVE = {"before": "empty arm before"}  # what reads otherwise than it is called
 _MISFIT = 3.0  # standard deviations between what is left and the nearest body, beyond which too much was taken off
 
@@ -45,6 +46,7 @@ class Load:
             known.
         std: standard deviation of phi (10,), where it was measured.
         remarks: what else its reader should know, a line each.
+        moment_widths: of the intervals of its moments of inertia about the centre of mass (3,), where measured.
     """
 
     parameters: InertialParameters
@@ -53,6 +55,7 @@ class Load:
     relative_to: str | None = None
     std: NDArray[np.float64] | None = field(default=None, repr=False)
     remarks: tuple[str, ...] = field(default=(), repr=False)
+    moment_widths: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         determined = tuple(bool(x) for x in self.determined)
@@ -69,14 +72,18 @@ class Load:
             return result
         if isinstance(result, OnlineEstimate):
             known, robot = tuple(bool(x) for x in result.determined), None if arm is None else arm.name
-            remarks = doubted(result.interval) + leaning(known, result.rests_on_prior.tolist())
+            remarks = remarks_on.doubted(result.interval) + remarks_on.leaning(known, result.rests_on_prior.tolist())
             return cls(result.parameters, known, robot, result.relative_to, result.std, remarks)
         std = (result.phi_high - result.phi_low) / (2 * Z95)
         known, resting = tuple(result.determined.tolist()), result.rests_on_prior.tolist()
-        inertia = (result.inertia_com, result.inertia_com_low, result.inertia_com_high)
-        remarks = doubted(result.interval) + of_a_part(result.segments) + leaning(known, resting)
-        remarks += loose(*map(np.diag, inertia), known=known)
-        return cls(result.parameters, known, result.robot, result.relative_to, std, remarks)
+        widths = np.diag(result.inertia_com_high - result.inertia_com_low)
+        remarks = (
+            remarks_on.doubted(result.interval)
+            + remarks_on.of_a_part(result.segments)
+            + remarks_on.leaning(known, resting)
+        )
+        remarks += remarks_on.loose(np.diag(result.inertia_com), widths, known)
+        return cls(result.parameters, known, result.robot, result.relative_to, std, remarks, widths)
 
     @property
     def frame(self) -> str | None:
@@ -124,10 +131,23 @@ class Load:
         return self._changed(self.parameters + other, "arm")
 
     def about(self, frame: str | None, arm: Arm | None = None) -> Load:
-        """The same load about another frame fixed to the arm's last moving link; see `about`."""
+        """The same load about another frame fixed to the arm's last moving link; see `about`.
+
+        What was not measured stays so: a parameter counts as measured where all are that it is computed from. Its
+        deviation is that of errors which are independent about the old frame.
+        """
         moved = about(self.parameters, frame, arm)
-        same = self.frame in (None, frame) or frame is None
-        return replace(self, parameters=moved, std=self.std if same else None)
+        if arm is None or frame is None or self.frame in (None, frame):
+            return replace(self, parameters=moved)
+        from armload.arms import from_frame  # with Pinocchio: only for who needs it
+
+        T = from_frame(replace(arm, frame=frame, attached=None), str(self.frame))
+        known = tuple(all(np.array(self.determined)[np.abs(row) > _NONE]) for row in T)
+        std = None if self.std is None else np.sqrt(T**2 @ self.std**2)
+        turned = bool(np.any(np.abs(T[1:4, 1:4] - np.eye(3)) > _NONE))
+        remarks = tuple(remarks_on.of_axes(remark, str(self.frame)) if turned else remark for remark in self.remarks)
+        widths = None if turned else self.moment_widths
+        return replace(self, parameters=moved, determined=known, std=std, moment_widths=widths, remarks=remarks)
 
     def as_body(self) -> Load:
         """The nearest load that a body can have, in units of its standard deviations; itself where it is one.
@@ -142,12 +162,12 @@ class Load:
             )
         if self.consistent:
             return self
-        return replace(self, parameters=InertialParameters(self._nearest(), self.frame))
+        return self._with(InertialParameters(self._nearest(), self.frame))
 
     def without_inertia(self) -> Load:
         """The same for who does not ask for an inertia: nothing is said of that."""
         determined = tuple(known or name[0] == "I" for known, name in zip(self.determined, NAMES, strict=True))
-        remarks = (without_moments(remark) for remark in self.remarks)
+        remarks = (remarks_on.without_moments(remark) for remark in self.remarks)
         return replace(self, determined=determined, remarks=tuple(remark for remark in remarks if remark))
 
     def description(self) -> tuple[str, ...]:
@@ -157,7 +177,7 @@ class Load:
             what += f" about {self.frame}"
         if self.relative_to:
             what += f", relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}"
-        lines = [what, *[NOTHING_HELD] * self.seems_nothing]
+        lines = [what, *[remarks_on.NOTHING_HELD] * self.seems_nothing]
         if self.undetermined:
             lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")
         # each on one line, and without what would end a comment
@@ -177,7 +197,15 @@ class Load:
         return float(np.linalg.norm(away)) > _MISFIT
 
     def _changed(self, parameters: InertialParameters, relative_to: str | None) -> Load:
-        return replace(self, parameters=parameters, relative_to=relative_to if self.relative_to else None)
+        return replace(self._with(parameters), relative_to=relative_to if self.relative_to else None)
+
+    def _with(self, parameters: InertialParameters) -> Load:
+        """Other parameters, as uncertain as before: of smaller moments that may be more than they are."""
+        remarks = self.remarks
+        if self.moment_widths is not None and parameters.mass > 0:
+            remarks = tuple(remark for remark in remarks if not remark.startswith(remarks_on.HARDLY_KNOWN))
+            remarks += remarks_on.loose(np.diag(parameters.inertia_com), self.moment_widths, self.determined)
+        return replace(self, parameters=parameters, remarks=remarks)
 
 
 def about(parameters: InertialParameters, frame: str | None, arm: Arm | None = None) -> InertialParameters:
@@ -232,7 +260,7 @@ def read_load(path: str | Path) -> Load:
     )
     determined = _flags(content, "determined", path)
     if determined is None:
-        return Load(parameters, robot=robot, relative_to=relative_to, remarks=assumed(payload))
+        return Load(parameters, robot=robot, relative_to=relative_to, remarks=remarks_on.assumed(payload))
     std = None
     try:
         low, high = (np.array(content[key], dtype=float) for key in ("phi_low", "phi_high"))
@@ -241,14 +269,17 @@ def read_load(path: str | Path) -> Load:
     except (KeyError, TypeError, ValueError, OverflowError):
         pass  # written by hand: the numbers themselves are enough
     resting = _flags(content, "rests_on_prior", path) or (False,) * 10
-    remarks = doubted(content.get("interval")) + of_a_part(content.get("segments"))
-    remarks += leaning(determined, resting) + assumed(payload)
+    remarks = remarks_on.doubted(content.get("interval")) + remarks_on.of_a_part(content.get("segments"))
+    remarks += remarks_on.leaning(determined, resting) + remarks_on.assumed(payload)
+    widths = None
     try:
         inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
-        remarks += loose(*(np.diag(np.array(x, dtype=float)) for x in inertia), known=determined)
+        value, low, high = (np.diag(np.array(x, dtype=float)) for x in inertia)
+        remarks += remarks_on.loose(value, high - low, determined)
+        widths = high - low if np.shape(high - low) == (3,) else None
     except (KeyError, TypeError, ValueError, OverflowError):
         pass
-    return Load(parameters, determined, robot, relative_to, std, remarks)
+    return Load(parameters, determined, robot, relative_to, std, remarks, widths)
 
 
 def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 _MOMENTS = (4, 7, 9)  # places of Ixx, Iyy, Izz
 _LEANING = "rests on what payloads are usually like more than on the log"
 HARDLY_KNOWN = "moments of inertia uncertain by more than half of their value"
+_AXES = ", in the axes of "
 _APPROXIMATE = "the intervals of what was identified are approximate, not calibrated"
 NOTHING_HELD = "nothing seems to be held: the mass is within three standard deviations of zero"
 
@@ -31,11 +32,18 @@ def without_moments(remark: str) -> str:
     """A remark without the moments of inertia that it names; empty: it is of nothing else."""
     from armload.payloads import INERTIA_ASSUMED
 
-    said, _, names = remark.partition(": ")
+    said, _, rest = remark.partition(": ")
     if said not in (_LEANING, HARDLY_KNOWN):
         return "" if remark == INERTIA_ASSUMED else remark
+    names, axes, frame = rest.partition(_AXES)
     left = [name for name in names.split(", ") if name[0] != "I"]
-    return f"{said}: {', '.join(left)}" if left else ""
+    return f"{said}: {', '.join(left)}{axes}{frame}" if left else ""
+
+
+def of_axes(remark: str, frame: str) -> str:
+    """A remark on a load that was turned: the parameters that it names are in the axes of another frame."""
+    named = remark.partition(": ")[0] in (_LEANING, HARDLY_KNOWN) and _AXES not in remark
+    return f"{remark}{_AXES}{frame}" if named else remark
 
 
 def doubted(interval: Any) -> tuple[str, ...]:
@@ -56,11 +64,11 @@ def leaning(determined: Sequence[bool], rests_on_prior: Sequence[bool]) -> tuple
     return (f"{_LEANING}: {', '.join(names)}",) if names else ()
 
 
-def loose(value: NDArray, low: NDArray, high: NDArray, known: Sequence[bool]) -> tuple[str, ...]:
+def loose(value: NDArray, widths: NDArray | None, known: Sequence[bool]) -> tuple[str, ...]:
     """A remark on moments of inertia about the centre of mass (3,) that are hardly known, though determined.
 
     Hardly: the interval is wider than the value, which a controller takes for exact.
     """
-    which = (np.shape(value) == np.shape(low) == np.shape(high) == (3,)) and (high - low > value)
+    which = widths is not None and np.shape(value) == np.shape(widths) == (3,) and (widths > value)
     names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
     return (f"{HARDLY_KNOWN}: {', '.join(names)}",) if names else ()

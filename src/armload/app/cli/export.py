@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import Parser, file_name, output_file
+from armload.app.cli.export_frame import frame_for, no_flange, on_flange
 from armload.app.cli.named import payload_of
 from armload.app.cli.printing import print_note
 from armload.errors import UsageError
@@ -14,7 +15,6 @@ from armload.errors import UsageError
 if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.devices import Load
-    from armload.errors import SinkError
     from armload.inertia import InertialParameters
 
 # when what is not in a load was mounted, by what it is relative to
@@ -28,7 +28,7 @@ examples:
   armload identify run.csv --robot panda --json > held.json
   armload export held.json --to franka --minus franka-hand    (Desk counts the hand already)
   armload export held.json --to urdf --out payload.urdf
-  armload export held.json --to ur --robot my_ur.urdf --frame tool0
+  armload export held.json --to ur --robot my_ur.urdf         (moved to the file's tool0, whatever is behind it)
   armload export franka-hand --to mjcf
 
 forms:
@@ -99,6 +99,9 @@ def run(options: argparse.Namespace) -> None:
     if NOTHING in options.minus:
         raise UsageError(f"--minus {NOTHING} takes nothing off: leave it out")
     doubts = _doubts(options.minus, load)
+    if load.frame is None and arm is not None:  # before parts, which name theirs
+        load = load.about(options.frame or frame_for(load, options.to, arm), arm)
+        doubts.append(f"{options.result} names no frame: it is taken to be about {load.frame}")
     added = bool(options.plus) and load.relative_to in _SINCE
     if added and set(options.plus) != {NOTHING}:
         doubts.append(
@@ -138,18 +141,12 @@ def write(
     from armload.devices import FORMS as FORMS_OF
     from armload.devices.load_remarks import HARDLY_KNOWN, NOTHING_HELD
 
-    nothing, about = load.seems_nothing, frame
-    if about is None and arm is not None:
-        # a load about a flange that the arm knows by another name stays as it is
-        on_flange = load.frame is not None and load.frame not in arm.frames and _is_flange(load.frame)
-        if load.frame is None or (to in CONTROLLERS and not on_flange):
-            about = arm.frame
-    load = load.about(about, arm)
-    elsewhere = to in CONTROLLERS and load.frame is not None and not _is_flange(load.frame)
+    whole = load.as_body()  # about its own frame, where its error bars are
+    nothing, body = load.seems_nothing, whole.about(frame_for(load, to, arm) if frame is None else frame, arm)
+    elsewhere = to in CONTROLLERS and body.frame is not None and not on_flange(body.frame, to, arm)
     if elsewhere and frame is None:
-        raise _no_flange(load)
-    body = load.as_body()
-    if body is not load:
+        raise no_flange(load, arm)
+    if whole is not load:
         print_note(
             "no body has the parameters that are left: the nearest one is written, with a mass of "
             f"{body.parameters.mass:.4f} kg instead of {load.parameters.mass:.4f} kg"
@@ -158,7 +155,7 @@ def write(
     if nothing:
         print_note(NOTHING_HELD)
     if elsewhere:
-        print_note(f"a controller counts from its flange; these numbers are about {load.frame}, as was asked for")
+        print_note(f"a controller counts from its flange; these numbers are about {body.frame}, as was asked for")
     numbers = [note for note in _on_numbers(FORMS_OF[to].held_of(body)) if not earlier or note.startswith(HARDLY_KNOWN)]
     for note in (*earlier, *doubts, *numbers, *_on_use(body, to, added)):
         print_note(note)
@@ -166,17 +163,6 @@ def write(
         print(text, end="")
     else:
         print_note(f"{out}: {body.description()[0]}")  # what else is said of it, the notes have said
-
-
-def _no_flange(load: Load) -> SinkError:
-    from armload.arms import ARMS
-    from armload.errors import SinkError
-
-    flanges = ", ".join(sorted({facts.flange for facts in ARMS.values()}))
-    return SinkError(
-        f"the payload is about {load.frame!r} and a controller counts from its flange ({flanges}): "
-        "name the arm and its flange with --robot FILE.urdf --frame FLANGE"
-    )
 
 
 def _arm(robot: str, frame: str | None = None) -> Arm:
@@ -188,13 +174,6 @@ def _arm(robot: str, frame: str | None = None) -> Arm:
 def _moves(options: argparse.Namespace, frame: str | None, flange: str) -> bool:
     """Whether something may have to be told of another frame: what is about the flange and stays there needs no arm."""
     return frame != flange or options.frame not in (None, flange) or bool(options.minus or options.plus)
-
-
-def _is_flange(frame: str) -> bool:
-    """Whether a frame is called as a built-in arm's flange, with whatever prefix."""
-    from armload.arms import ARMS
-
-    return frame.endswith(tuple(facts.flange_ending for facts in ARMS.values()))
 
 
 def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
