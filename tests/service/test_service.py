@@ -252,6 +252,24 @@ def test_kill_9_of_the_service_ends_all_its_processes_and_the_next_goes_on_from_
 
 
 @pytest.mark.full
+def test_a_second_service_writes_over_no_state_of_the_first(serve, cell, tmp_path):
+    path = cell("light")
+    first = serve(path)
+    first.until(lambda line: line.get("n_samples", 0) > 100)
+    second = serve(path)
+    assert second.process.wait(120.0) == 2
+    for thread in second.threads:
+        thread.join()
+    assert "another process keeps its state in" in second.notes[-1]
+    assert {line["unknown"] for line in second.lines.queue} <= {"starting", "compiling"}
+    first.until(lambda line: line.get("n_samples", 0) > 100)
+    first.process.terminate()
+    assert first.process.wait(60.0) == 0
+    (state,) = (tmp_path / "state").iterdir()
+    assert state.suffix == ".npz"
+
+
+@pytest.mark.full
 def test_kill_9_of_every_process_in_turn_is_survived(serve, cell):
     running = serve(cell("light", "heavy"))
     for name in ("light", "heavy"):

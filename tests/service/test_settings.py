@@ -95,6 +95,8 @@ def test_the_page_has_a_row_for_every_setting():
         (("gravity = [0, 0, -9.8]", "gravity = [nan, 0, 0]"), "expected three numbers"),
         (('name = "right"', 'name = "left"'), "two arms are called 'left'"),
         (('name = "right"', 'name = "../right"'), "letters, digits"),
+        (('name = "right"', f'name = "{"r" * 101}"'), "at most 100 letters"),
+        (("every = 0.5", "every = 1e-9"), "every is 1e-09 s: expected at least 0.02 s"),
         (('robot = "panda"\n', ""), "there is no robot"),
         (("[[arm]]", "[arm]"), "cannot|no TOML|list of tables"),
         (("gravity = [0, 0, -9.8]", "gravity = [0, 0]"), "expected three"),

@@ -9,12 +9,14 @@ import os
 import re
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 _STREAMS = re.compile(r"/proc/|/dev/(fd/|std(in|out|err)$)")  # open already, even where a plain file is behind it
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a write, which names no file
+_AGAIN = 0.05  # [s] between two looks at a lock
 _WRITERS = 8  # of one file at once, each with a name of its own; there is no limit, but more have names by chance
 
 
@@ -74,6 +76,54 @@ def clear_left_over(path: str | Path) -> None:
                     part.unlink()
             finally:
                 os.close(handle)
+
+
+@contextmanager
+def kept_alone(path: str | Path, patience: float) -> Iterator[None]:
+    """Within, no other process is in such a block for the same file, which need not exist.
+
+    A file beside it is locked; the kernel lets go of the lock however its owner ends. Where no such file can be made or
+    locked (no such folder, read-only, no locks there), nothing is asked.
+
+    Args:
+        patience: [s] another process is waited for.
+
+    Raises:
+        BlockingIOError: it is still there.
+    """
+    path = Path(path)
+    lock = path.with_name(f".{path.name}.lock")
+    handle = _locked(lock, patience)
+    try:
+        yield
+    finally:
+        if handle is not None:
+            lock.unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _locked(lock: Path, patience: float) -> int | None:
+    until = time.monotonic() + patience
+    while True:
+        try:
+            handle = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        except OSError:
+            return None
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if _is(handle, lock):
+                return handle
+            # else whoever held it has just removed it: look again
+        except BlockingIOError:
+            if time.monotonic() > until:
+                os.close(handle)
+                raise
+            time.sleep(_AGAIN)
+        except OSError:  # a file system without locks
+            lock.unlink(missing_ok=True)
+            os.close(handle)
+            return None
+        os.close(handle)
 
 
 def _part(target: Path, k: int, suffix: str) -> Path:

@@ -22,14 +22,14 @@ from armload.arms import Arm
 from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
 from armload.devices.recorder import next_free
-from armload.errors import ArmloadError, IdentificationError
+from armload.errors import ArmloadError, IdentificationError, UsageError
 from armload.identification.tare_age import age_of, in_words
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
 from armload.posterior import Known, Profile, load_profile
 from armload.posterior.drift import SESSION
 from armload.recording import Sample, check_own_measurements, read_recording
-from armload.runtime.atomic import clear_left_over
+from armload.runtime.atomic import clear_left_over, kept_alone
 from armload.runtime.compiling import COMPILING, compiling
 from armload.service.catching_up import CatchingUp
 from armload.service.feedback import Feedback
@@ -41,6 +41,7 @@ from armload.service.settings import ArmSettings
 from armload.service.unknown import Unknown, Why, why_unknown
 
 SAVE_EVERY = 60.0  # [s] of what a kill may cost; saving takes the stream a tenth of a second
+_ENDS = 15.0  # [s] the process of a service that was killed may take to save and end: seconds on busy cores
 
 
 class ArmProcess:
@@ -74,7 +75,7 @@ class ArmProcess:
 
     def run(self) -> None:
         """Until the source or standard input ends."""
-        with self._speaking():
+        with self._speaking(), self._alone():
             self.source.start()  # it is opened while the state is read
             self.session = session = self._made_session()
             self._saved = time.monotonic()
@@ -118,6 +119,20 @@ class ArmProcess:
             yield
         finally:
             ended.set()
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Within the block no other process keeps the same state: each would write over what the other saved."""
+        with contextlib.ExitStack() as held:
+            if self._state is not None:
+                try:
+                    held.enter_context(kept_alone(self._state, _ENDS))
+                except BlockingIOError:
+                    raise UsageError(
+                        f"another process keeps its state in {self._state}: is the service running already? Stop it, "
+                        "or give this one another folder"
+                    ) from None
+            yield
 
     def _beginning(self) -> Why:
         """Why there is no answer before there is a session."""

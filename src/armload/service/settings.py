@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.inertia import InertialParameters
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")  # a file's name has room for more beside it
+LEAST_EVERY = 0.02  # [s] more lines are more than anybody reads
 READ = ("tare", "profile", "tool", "mounted", "body")  # files that an arm's process reads
 _PATHS = (*READ, "save", "record")
 NO_FILES = ("franka-hand", "test", "nothing")  # in the place of a payload's file
@@ -186,6 +187,10 @@ class ServiceSettings:
         if doubled := sorted({record for record in records if records.count(record) > 1}):
             raise UsageError(f"two arms are recorded in {doubled[0]}: give each a file of its own")
         check_service(self)
+        if not LEAST_EVERY <= self.every < math.inf:
+            raise UsageError(
+                f"every is {self.every:g} s: expected at least {LEAST_EVERY} s between two lines of an arm"
+            )
         if self.webhook is not None:
             check_webhook(self.webhook, self.headers)
         if self.mqtt is not None:
@@ -257,7 +262,7 @@ def _arm(table: dict[str, Any], path: Path) -> ArmSettings:
             raise UsageError(f"{where}: gravity is {settings['gravity']}: expected three numbers, in m/s²")
         settings["gravity"] = tuple(float(x) for x in settings["gravity"])
     if not _NAME.fullmatch(settings["name"]):
-        raise UsageError(f"{where}: the name is expected to be of letters, digits, '-', '_' and '.'")
+        raise UsageError(f"{where}: the name is expected to be of at most 100 letters, digits, '-', '_' and '.'")
     return ArmSettings(**settings)
 
 
