@@ -856,6 +856,96 @@ def test_on_new_episodes_the_hybrid_is_ahead_of_its_physics_as_the_readme_says()
     assert abs(tie[0]) < tie[1]
 
 
+def test_what_the_learned_parts_bring_in_words_is_in_the_committed_ablation():
+    page = words_of("hybrid_measured")
+    rows = {(row["row"], row["what"], row["t"]): row for row in result_of("hybrid_ablation")["rows"]}
+    names = ("same-prior least squares", "mixture prior", "hybrid: kappa by trees")
+
+    def removed(what, t, score):  # by the mixture, and by kappa of what is left then
+        one, mixture, kappa = (rows[name, what, t][score] for name in names)
+        return 1 - mixture / one, 1 - kappa / mixture
+
+    assert removed("tare", 1.0, "inertia_g_m2") == pytest.approx((3 / 5, 1 / 5), abs=0.03)
+    assert removed("no tare", 1.0, "inertia_g_m2") == pytest.approx((1 / 4, 1 / 2), abs=0.03)
+    assert "three fifths of the inertia's error at 1 s" in page
+    assert "kappa a fifth of the rest; without a tare, a quarter and half" in page
+    for what in ("tare", "no tare"):
+        assert removed(what, 6.0, "mass_g") == pytest.approx((1 / 6, 1 / 20), abs=0.02)
+        assert removed(what, 6.0, "first_moment_g_m") == pytest.approx((1 / 4, 1 / 10), abs=0.02)
+    assert (
+        "removes a sixth of the mass's error and a quarter of the first moments', kappa a twentieth and a tenth" in page
+    )
+    more = np.array([one for line in result_of("trust")["lines"] for one in line["more"]])
+    below, above = (int(np.sum(sign * more[:, 0] > 2.0 * more[:, 1])) for sign in (-1.0, 1.0))
+    assert (len(more), above) == (72, 2)
+    assert f"Of all 72 differences (eight times) {below} are below zero by more than two" in page
+    told = {
+        (line["family"], line["known"], line["t"]): line["error"][0] for line in result_of("known_payloads")["lines"]
+    }
+    worse = {
+        family: max(told[family, "family", t] / told[family, "nothing", t] for t in (1.0, 6.0))
+        for family, known, _ in told
+        if known == "family" and family != "all"
+    }
+    most = max(worse, key=lambda family: worse[family])
+    assert f"of all but wide bodies worse by up to {100 * (worse[most] - 1):.0f} % (a {most}'s)" in page
+    assert [family for family, ratio in worse.items() if ratio < 1.0] == ["trays, bars, rings"]
+    old = {name: found["mass error [g]"] for name, found in result_of("old_tares")["answered"].items()}
+    told_sizes, bound = result_of("old_tares"), result_of("old_tares")["bound [g]"]
+    less = told_sizes["answered"]["old, sizes told"]["more than the old tare as it is answered [g]"]
+    assert f"brings nothing ({-less[0]:.1f} ± {less[1]:.1f} g less, paired)" in page
+    assert f"drawn with leaves {old['old, every size told'][0]:.0f} g" in page
+    assert f"The bound of the latter is {bound['old, sizes told, noise as expected'][0]:.0f} g" in page
+    assert f"the bound is {bound['old, sizes told, noise as shown'][0]:.1f} g" in page
+    assert f"is off by {old['old, every size told, noise as shown'][0]:.0f} g" in page
+    fresh, every = old["same session"][0], old["same session, every size told"][0]
+    assert f"the error of a fresh tare: {fresh:.0f} g, or {every:.0f} with every size known" in page
+    assert f"Five seconds of today alone leave {old['5 s of today'][0]:.0f} g here" in page
+
+
+def test_the_structure_and_what_the_rebuilt_estimator_costs_are_those_of_the_committed_results():
+    text, page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8"), words_of("architecture")
+    structure = result_of("structure")
+    for name, key in (
+        ("rooms", "rooms"),
+        ("modules", "modules"),
+        ("lines", "lines"),
+        ("arrows between rooms", "arrows"),
+        ("deepest inheritance [classes]", "inheritance"),
+        ("named numbers on the way of identify", "constants, identify"),
+        ("named numbers on the way of the stream", "constants, stream"),
+    ):
+        assert f"| {name} | {structure['before'][key]} | {structure['after'][key]} |" in text
+    installed = [structure[when]["installed"]["MB"] for when in ("before", "after")]
+    assert "| installed dependencies [MB] | {} | {} |".format(*installed) in text
+    suite = result_of("suite")
+    minutes, seconds = divmod(round(suite["make test"]["wall_s"]), 60)
+    assert f"took {minutes} min {seconds} s on two cores at revision {suite['revision']}, after a set-up of" in page
+    assert f"a set-up of {suite['set-up']['wall_s']:.0f} s" in page
+    past, present = result_of("before_after"), result_of("before_after_present")
+    for found, said in (
+        (past, "costs {:.2f} (median), {:.2f} (99 %) and {:.2f} (99.9 %) times what it did"),
+        (present, "costs {:.2f} (median), {:.2f} (99 %), {:.2f} (99.9 %)"),
+    ):
+        ratios = [found["online"]["thread"][score]["ratio"] for score in ("p50", "p99", "p99.9")]
+        assert said.format(*ratios) in page
+    for line in present["answers"]["hybrid"]:
+        scores = ("mass_g", "first_moment_g_m", "inertia_g_m2")
+        worse = [line[f"{score}_more"] > 2.0 * line[f"{score}_more_se"] for score in scores]
+        assert any(worse) == ((line["what"], line["t"]) == ("hybrid, tare", 0.1))
+    truths = [2.805 if "2.805" in log["log"] else 1.48 if "1.48" in log["log"] else 0.0 for log in present["real_logs"]]
+    errors = np.abs([np.array(log["mass_kg"]) - truth for log, truth in zip(present["real_logs"], truths, strict=True)])
+    held = errors <= [log["half_width_kg"] for log in present["real_logs"]]
+    assert held.sum(axis=0).tolist() == [9, 10]
+    assert "all ten true masses lie in their intervals (nine before)" in page
+    assert "the error is {1:.2f} kg instead of {0:.2f} for the UR10e".format(*errors[1]) in page
+    assert "and no tare, {1:.0f} g instead of {0:.0f} with one".format(*1e3 * errors[0]) in page
+    assert f"for the Panda at most {1e3 * np.max(errors[3:, 1] - errors[3:, 0]):.0f} g larger" in page
+    times = result_of("nearest_body")["rows"]
+    assert all(4.0 < row["clarabel_over_nearest"] < 6.5 and row["clarabel_over_near"] > 10.0 for row in times)
+    assert "takes a fourth to a sixth of Clarabel's time, on a stream less than a tenth" in page
+
+
 def test_the_table_of_an_update_s_cost_is_that_of_the_committed_benchmark():
     page = (ROOT / "docs" / "online.md").read_text(encoding="utf-8")
     for row in rows_of_speed(json.loads((RESULTS / "online_speed.json").read_text())):
