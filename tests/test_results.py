@@ -302,6 +302,8 @@ def test_what_holds_of_every_kind_of_log_is_what_was_measured():
     assert f"inertias in {100 * inertia[0]:.0f} to {100 * inertia[1]:.0f} % of the training's families" in short
     assert f"but in {100 * wide[0]:.0f} to {100 * wide[1]:.0f} % of trays, bars and rings" in short
     assert f"**Masses and first moments** hold in {100 * low:.0f}–100 % in all cells" in long
+    said = f"only {100 * wide[0]:.0f}–{100 * wide[1]:.0f} % of the hybrid's intervals for determined inertias hold"
+    assert said in " ".join(README.split())
     width = shares(rest, 2, "width")
     assert (
         f"hold in {100 * inertia[0]:.0f}–{100 * inertia[1]:.0f} % for the training's families, in intervals of "
@@ -743,6 +745,9 @@ def test_what_stands_beside_the_survey_s_tables_is_in_them():
     seconds = round(runs["1 process"]["cpu seconds"] / speed["logs"], 1)
     assert f"at {seconds:.1f} core-seconds a log" in page
     assert f"100 machines of 16 cores need {seconds * 1e6 / 1600 / 60:.0f} minutes" in page
+    called = {gap: found[1] for gap, found in result_of("loose_grippers")["called"].items()}
+    assert (called["0"], called["5"]) == (0.0, 0.5)
+    assert called["10"] > 0.9  # nearly all
     peaks = [(one["kind"], one["file [MB]"], one["peak [MB]"]) for one in result_of("long_logs")["logs"]]
     (bag,) = (peak for kind, size, peak in peaks if kind == "mcap" and size > 2000)
     assert f"A bag of 2 GB takes {bag:.0f} MB, and no kind more than 480" in page
@@ -842,6 +847,73 @@ def test_what_is_said_of_probabilities_and_of_real_motor_currents_is_in_the_comm
     hours, count = (sum(part["false"][what] for part in scenes) for what in ("hours", "count"))
     assert f"In {hours:.1f} hours of all simulated scenes but drift and pushes nine events were false" in page
     assert (count, parts["early"]["false"]["count"]) == (9, 8)
+
+
+def test_what_stands_beside_the_other_tables_of_streams_is_in_the_committed_results():
+    page = words_of("online_measured")
+    arms = result_of("events_of_arms")["parts"]
+    side = {
+        name: [
+            part for key, part in arms.items() if (key.split("-")[0] in ("gen3", "iiwa14", "fr3")) == (name == "joint")
+        ]
+        for name in ("joint", "motor")
+    }
+
+    def in_time(parts):
+        return sum(part["changes"] - part["missed"]["count"] for part in parts), sum(part["changes"] for part in parts)
+
+    def inside(parts, time):
+        return sum(part[f"after_{time}_s"]["inside"]["count"] for part in parts)
+
+    assert in_time(side["joint"]) == (72, 72)
+    assert [inside(side["joint"], time) for time in ("0.5", "1", "2", "5")] == [72, 71, 71, 71]
+    assert "all 72 changes are noticed in time, and all intervals but one hold" in page
+    assert "{} of {} changes are noticed in time, no event is false".format(*in_time(side["motor"])) in page
+    assert sum(part["false"]["count"] for part in side["motor"]) == 0
+    hold = [inside(side["motor"], time) for time in ("0.5", "1", "2")]
+    assert f"{hold[0]} of 72 hold half a second after a change, {hold[1]} after one second, all after two" in page
+    assert hold[2] == 72
+    told = [100 * part["calibrated"] for part in side["motor"]]
+    assert f"calibrated in {min(told):.0f} to {max(told):.0f} % of the time there" in page
+
+    sticks = {
+        way: [x for arm in ("panda", "fr3") for x in result_of("sticking_streams")["streams"][f"{arm}; sticks; {way}"]]
+        for way in ("learned", "smooth")
+    }
+    noticed, false = ([sum(one[what] for one in found) for found in sticks.values()] for what in ("noticed", "false"))
+    assert "{} of 48 changes are noticed in time instead of {}".format(*noticed) in page
+    assert "and {} events are false instead of {}".format(*false) in page
+
+    coarse = [
+        case["as they come"]["false"]
+        for by_case in result_of("rubbing_streams")["robots"].values()
+        for name, case in by_case.items()
+        if "differences" in name and "taken up" not in name
+    ]
+    assert f"with {sum(coarse)} false changes in {12 * len(coarse)} streams" in page
+
+    lots = [row for row in result_of("near_payloads")["rows"] if (row["mass"], row["share"]) == (0.3, 0.2)]
+    shares = {
+        fixed: [100 * row["after"][t]["inside"] for row in lots if row["fixed"] == fixed for t in ("1", "2", "3.5")]
+        for fixed in (True, False)
+    }
+    assert f"only {min(shares[True]):.0f} to {max(shares[True]):.0f} % of the masses are inside" in page
+    assert f"As it is, {min(shares[False]):.0f} to {max(shares[False]):.0f} % are" in page
+    width = {
+        (row["kind"], row["fixed"]): {t: after["half_width_g"] for t, after in row["after"].items()}
+        for row in result_of("near_payloads")["rows"]
+        if row["share"] == 0.0
+    }
+    for kind, t, words in (
+        ("standing", "0.5", "{:.0f} g (rule *15 g*: {:.0f} g)"),
+        ("moving", "1", "{:.0f} g ({:.0f} g)."),
+    ):
+        assert words.format(width[kind, False][t], width[kind, True][t]) in page
+
+    warm = result_of("warming_up")["parts"]
+    assert {part["false"]["count"] for part in warm.values()} == {0}
+    wrong = [warm[f"warms up, {what}"]["calibrated_and_out"] for what in ("all", "cut back")]
+    assert np.divide(*wrong) == pytest.approx(2.0, abs=0.2)
 
 
 def test_on_new_episodes_the_hybrid_is_ahead_of_its_physics_as_the_readme_says():
