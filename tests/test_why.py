@@ -121,3 +121,28 @@ def test_the_path_is_walked_once_and_rests_in_the_pauses(panda):
     assert np.all(np.diff(way) >= 0.0)
     resting = ~schedule.guided(t)
     assert np.all(np.diff(way)[resting[:-1] & resting[1:]] == 0.0)
+
+
+def test_what_the_page_says_of_the_largest_residuals_and_of_the_leading_hand_was_measured():
+    rows, words = (
+        (
+            json.loads(script_of(name).STUDY.result.read_text(encoding="utf-8"))["rows"]
+            for name in ("closed_loop", "hand_guided")
+        ),
+        " ".join(PAGE.split()),
+    )
+    controlled, guided = rows
+    largest = {
+        key: [row["residual_max_Nm"] for row in controlled if (row["payload"], row["declared"]) == key]
+        for key in (("1.5 kg", "nothing"), ("2.8 kg", "nothing"))
+    }
+    assert min(largest["1.5 kg", "nothing"]) < 10.0 < max(largest["1.5 kg", "nothing"]) < 20.0
+    heavy = largest["2.8 kg", "nothing"]
+    assert f"it probably does ({min(heavy):.0f} to {max(heavy):.0f} N·m)" in words
+    after = max(row["residual_max_Nm"] for row in controlled if row["declared"] == "identified")
+    assert f"no run exceeded {after:.1f} N·m" in words
+    led = [row for row in guided if (row["log"], row["method"]) == ("led", "hybrid")]
+    most = max(row["mass_error_kg"] for row in led)
+    assert f"costs the hybrid up to {most:.2f} kg, a third of the lightest payload" in words
+    assert most / min(row["true_mass_kg"] for row in led) == pytest.approx(1 / 3, abs=0.02)
+    assert (sum(row["mass_covered"] for row in led), len(led)) == (5, 6)

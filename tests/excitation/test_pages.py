@@ -112,3 +112,36 @@ def test_how_good_a_designed_pair_is_and_how_soon_is_what_was_measured():
     assert f"reaches it in {100 * panda['excitation']['reached_share']:.0f} % of the worlds" in words
     assert mostly * 3.0 < 6.0
     assert panda["excitation"]["reached_median_s"] is None
+
+
+def test_in_how_many_worlds_a_motion_reaches_the_accuracy_is_what_was_measured():
+    words = " ".join(PAGE.split())
+    panda, ur = (
+        {name: round(100 * found["reached_share"]) for name, found in result("designed_motions")["arms"][arm].items()}
+        for arm in ("panda", "ur10e")
+    )
+    elsewhere = {
+        name: share for name, share in panda.items() if name not in {"designed same", "pair"} and "pair" not in name
+    }
+    long = elsewhere.pop("designed 3 s")
+    assert (
+        f"`taie2024` reaches it in {elsewhere['excitation']} % of the worlds within 6 s, the designed 3 s in {long} %"
+        in words
+    )
+    assert f"none of the others in more than {max(elsewhere.values())} %" in words
+    same = ur.pop("designed same")
+    assert f"reach the accuracy within 6 s, in {same} % of the worlds" in words
+    assert set(ur.values()) == {0}
+    bound = [
+        result("designed_motions")["arms"]["ur10e"][name]["predicted_over_given"] for name in ("designed same", "pair")
+    ]
+    assert all(abs(found[0] - 0.25) < 0.03 for found in bound)
+
+
+def test_what_the_quickest_ways_would_save_is_what_was_measured():
+    arms = result("ways_to_start")["arms"]
+    panda, ur = ([arms[name][way]["duration"] for way in ("ruckig", "quintic")] for name in ("panda", "ur10e"))
+    assert abs(panda[0] / panda[1] - 2 / 3) < 0.05
+    assert abs(ur[0] / ur[1] - 4 / 5) < 0.05
+    assert all(slow - quick < 1.0 for quick, slow in (panda, ur))  # [s], less than a second in the median
+    assert all(set(found["one only"].values()) == {0} for found in arms.values())  # both ways or neither

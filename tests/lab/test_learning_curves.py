@@ -1,6 +1,7 @@
 """The parts of the learning curves: what a training holds, what is never seen by it, and what a row is."""
 
 import importlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -58,3 +59,37 @@ def test_trainings_of_another_size_are_measured_anew_and_the_physics_beside_them
     changed = {name for name in small if small[name] != large[name]}
     assert changed == {name for name in small if name.startswith("trees")}
     assert len({small[name] for name in changed}) == len(changed)
+
+
+def test_the_page_shows_the_committed_cells_and_says_what_they_say(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    page = importlib.import_module("learning_page")
+    cells = [
+        cell
+        for name in ("learning_curves", "learning_networks")
+        for cell in json.loads((FOLDER / "results" / f"{name}.json").read_text(encoding="utf-8"))["cells"]
+    ]
+    text = (FOLDER.parent / "docs" / "learning.md").read_text(encoding="utf-8")
+    assert page.table(cells) in text
+    words = " ".join(text.split())
+
+    def of(method, where, name="mass"):
+        errors = page.pooled([cell for cell in cells if cell.get("set") == where], method)
+        return errors[:, 0].mean() if name == "mass" else errors[:, 1:4].mean()
+
+    trees, networks = (page.trainings(cells, learner) for learner in ("trees", "networks"))
+    ten = page.mass(page.pooled(trees[10_000, 10_000, 10_000], "arm"))
+    assert "{:.0f} ± {:.0f} g at best, against {:.0f} and".format(*ten, of("map-gp", "arm")) in words
+    assert f"and {of('hybrid, with tare', 'arm'):.0f}. Ten times the data cost" in words
+    best = min(page.mass(page.pooled(same, "arm"))[0] for same in trees.values())
+    assert best == ten[0]
+    on_motions = {counts: page.mass(page.pooled(same, "motion")) for counts, same in trees.items()}
+    found = on_motions.pop((10_000, 10_000, 10_000))
+    first = [mass for mass, _ in on_motions.values()]
+    mean, least = of("training mean", "motion"), of("map-gp", "motion")
+    assert f"with 1000 logs {min(first):.0f} to {max(first):.0f} g (the training mean: {mean:.0f})" in words
+    assert f"{found[0]:.0f} ± {found[1]:.0f} g, where least squares errs by {least:.0f} and" in words
+    wide = page.mass(page.pooled(networks[1000, 1000, 1000], "motion"))
+    assert f"{wide[0]:.0f} ± {wide[1]:.0f} g on new motions (trees {on_motions[1000, 1000, 1000][0]:.0f}" in words
+    assert wide[0] / least == pytest.approx(7.0, abs=0.3)  # physics stays seven times nearer
+    assert {len(same) for learner in (trees, networks) for same in learner.values()} == {2}  # two seeds of everything

@@ -1,6 +1,7 @@
 """The paper's protocol on another arm and with other payloads."""
 
 import importlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -45,3 +46,44 @@ def test_another_arm_s_data_set_has_its_joints_and_hides_the_right_columns(tmp_p
     names = ["t", *(f"{s}{k}" for s in ("q", "dq", "tau") for k in range(6))]
     for signal in ("t", "q", "dq", "tau"):
         assert {name.rstrip("0123456789") for name in names[_columns(signal, 6)]} == {signal}
+
+
+def test_the_page_shows_the_committed_result_and_says_what_it_says(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    page = importlib.import_module("study_travel_page")
+    settings = json.loads((FOLDER / "results" / "study_travel.json").read_text(encoding="utf-8"))["settings"]
+    text = (FOLDER.parent / "docs" / "paper_travel.md").read_text(encoding="utf-8")
+    assert page.groups(settings) in text
+    assert page.each(settings) in text
+    words, parameters = " ".join(text.split()), {c["id"]: c["parameter"] for c in page.load_claims()}
+
+    def counted(name, split, *starts):  # hold, open, reversed
+        chosen = [
+            found[split][2]
+            for key, found in settings[name]["claims"].items()
+            if key.startswith(starts) and page.comparable(name, key, parameters)
+        ]
+        return [chosen.count(wanted) for wanted in (True, None, False)]
+
+    trees = ("fig4-tree-network", "fig5-tree-network")
+    arm = [counted("UR10e, container", split, *trees) for split in ("row", "payload")]
+    said = [f"{found[0]} of {sum(found)}" for found in arm]
+    assert f"{said[0]} percentages hold on rows held out, {said[1]} on payloads held out" in words
+    holds, other, reverse = counted("Panda, boxes", "payload", *trees)
+    assert f"{holds} of {holds + other + reverse} hold and {reverse} are reversed" in words
+    holds, other, reverse = counted("UR10e, container", "row", "fig7-")
+    assert f"strongest on the UR10e ({holds} of {holds + other + reverse})" in words
+    gains = [
+        found[split][0]
+        for setting in settings.values()
+        for key, found in setting["claims"].items()
+        if key.startswith("stages-tree-two")
+        for split in ("row", "payload")
+    ]
+    paper = [c["paper"] for c in page.load_claims() if c["id"].startswith("stages-tree-two")]
+    assert f"at most {max(gains):.0f} %, far from the paper's {min(paper):.0f}–{max(paper):.1f} %" in words
+    close = {name: setting["claims"]["real-close-tree"]["row"][0] for name, setting in settings.items()}
+    said = "(errors {:.1f} times as large on a real-like Panda, {:.1f} on a UR10e, {:.1f} with boxes"
+    assert said.format(*close.values()) in words
+    far = settings["UR10e, container"]["claims"]["real-close-network"]["row"][0]
+    assert f"fails for networks on the UR10e ({far:.0f} times)" in words

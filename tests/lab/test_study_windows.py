@@ -1,6 +1,7 @@
 """Windows of any motion and arm: what is in them, what their simplest physics finds, and what is judged."""
 
 import importlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -76,3 +77,41 @@ def test_every_cell_has_its_own_name_and_another_size_of_training_changes_learne
     assert len(small) == len(script.tasks(tmp_path, 4))
     same = {name for name in small if large.get(name) == small[name]}
     assert {name for name in small if name.startswith(("judged", "shard"))} == same
+
+
+def test_the_page_shows_the_committed_cells_and_says_what_they_say(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    page = importlib.import_module("study_windows_page")
+    cells = json.loads((FOLDER / "results" / "study_windows.json").read_text(encoding="utf-8"))["cells"]
+    text = (FOLDER.parent / "docs" / "learning.md").read_text(encoding="utf-8")
+    assert page.table(cells) in text
+    assert page.gained(cells) in text
+    words = " ".join(text.split())
+    mass = {
+        key: {
+            worlds: (errors[worlds][:, 0].mean(), errors[worlds][:, 0].std(ddof=1) / np.sqrt(len(errors[worlds])))
+            for worlds in errors
+        }
+        for key, (errors, _) in page.learners(cells).items()
+        if key[1] != page.ON_TOP
+    }
+    whole = {key: found for key, found in mass.items() if key[3] == 2000}
+    for worlds, kind, said in (
+        ("real_like", "conv", "on new arms (convolution)"),
+        ("beyond", "gru", "beyond them (GRU)"),
+    ):
+        best = min(whole, key=lambda key: whole[key][worlds][0])
+        assert best[0] == kind
+        assert "{:.0f} ± {:.0f} g {}".format(*whole[best][worlds], said) in words
+    without, tare, raw = (
+        [
+            found["beyond"][0]
+            for (_, seen, given, *_), found in whole.items()
+            if (seen == "raw") is is_raw and given == told
+        ]
+        for is_raw, told in ((False, "no tare"), (False, "with tare"), (True, "with tare"))
+    )
+    assert f"from {min(without):.0f}–{max(without):.0f} to {min(tare):.0f}–{max(tare):.0f} g" in words
+    assert f"raw signals stay at {min(raw):.0f}–{max(raw):.0f}" in words
+    more = [mass["conv", "residual", "with tare", count, 0]["real_like"][0] for count in (500, 1000, 2000)]
+    assert "{:.0f}, {:.0f} and {:.0f} g with 500, 1000 and 2000".format(*more) in words

@@ -31,3 +31,12 @@ def test_memory_and_processor_time_are_the_committed_results():
     assert f"{100 * steady['share of a core']:.1f} % where it stays the same" in PAGE
     assert f"takes {steady['state, mean [MB]']:.0f} MB while the payload stays the same" in PAGE
     assert f"{changing['state, mean [MB]']:.0f} MB in the mean where it changes every 15 s" in PAGE
+
+
+def test_what_a_spare_process_takes_is_the_committed_result():
+    sizes = [
+        kill["PSS of arm's and spare process [MB]"]
+        for kill in json.loads((RESULTS / "recovery.json").read_text())["with a spare process"]
+    ]
+    arm, spare = ([each[k] for each in sizes] for k in (0, 1))
+    assert f"takes {min(spare)} to {max(spare)} MB beside the arm's {sorted(arm)[len(arm) // 2]} MB" in PAGE
