@@ -71,7 +71,7 @@ def page() -> str:
         "",
         "Written by `armload methods --markdown`. Every method takes the same log and gives the same ten parameters",
         "with intervals: `armload identify LOG --method NAME`, in Python `METHODS[NAME].make(arm, tare)`. The best",
-        "come first. The [benchmark](benchmark.md) and [older results](results.md) measure the main ones.",
+        "come first. The [benchmark](benchmark.md) and [results on real-like arms](results.md) measure the main ones.",
         "",
         "In most cases do not choose: the default is `hybrid` where one is trained for the arm, else `map-gp`. Take",
         "`map-gp` for a wide and thin payload, and `rls-filter` to compare with published results.",
