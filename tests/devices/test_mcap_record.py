@@ -149,14 +149,18 @@ def test_a_clock_that_starts_anew_starts_a_new_part(tmp_path, panda):
     ]  # one is doubted
 
 
-def test_a_record_of_many_hours_is_in_files_of_six_of_which_each_is_whole(tmp_path, panda):
+@pytest.mark.parametrize("kind", ["mcap", "csv"])
+def test_a_record_of_many_hours_is_in_files_of_six_of_which_each_is_whole(tmp_path, panda, kind):
     made = [sample._replace(t=1800.0 * k) for k, sample in enumerate(samples(30))]
-    with Recorder(tmp_path / "run.mcap", 7, panda.joint_names) as recorder:
+    with Recorder(tmp_path / f"run.{kind}", 7, panda.joint_names) as recorder:
         for sample in made:
             recorder.append(sample)
-    assert [path.name for path in recorder.paths] == ["run.mcap", "run.2.mcap", "run.3.mcap"]
+    assert [path.name for path in recorder.paths] == [f"run{part}.{kind}" for part in ("", ".2", ".3")]
     assert recorder.kept == 30
-    kept = [len(decoded(path)[JOINT_STATES]) for path in recorder.paths]
+    if kind == "mcap":
+        kept = [len(decoded(path)[JOINT_STATES]) for path in recorder.paths]
+    else:
+        kept = [len(path.read_text().splitlines()) - 1 for path in recorder.paths]
     assert kept == [12, 12, 6]
 
 

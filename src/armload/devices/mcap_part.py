@@ -37,7 +37,6 @@ TOPICS = {
     DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
     LOG: "rcl_interfaces/msg/Log",
 }
-_LONGEST = 6 * 3600.0  # [s] in one file: its index waits in memory, 45 MB a day with one topic, and is written at once
 _INFO, _WARN = 20, 30  # levels of rcl_interfaces/Log
 _SHOWN = ("method", "relative_to", "interval", "held", "p_held", "p_change", "p_contact", "p_drift", "n_samples")
 _SHOWN = (*_SHOWN, "since", "age", "lag", "moving", "settling", "left_out", "pauses", "clock_jumps")
@@ -58,10 +57,6 @@ class McapPart:
         self._names = list(joint_names)
         self._first: float | None = None
         self._epoch = self._now = 0  # [ns]
-
-    def ends_before(self, t: float) -> bool:
-        """Whether a sample at time t [s] belongs into the next file."""
-        return self._first is not None and t - self._first >= _LONGEST
 
     def append(self, row: list[float]) -> None:
         """A sample: t, q, dq, tau."""
