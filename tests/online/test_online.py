@@ -16,7 +16,7 @@ from armload.arms import arm
 from armload.devices import Load, Simulator
 from armload.devices.franka import writer as franka_robot
 from armload.ensembles.compiled import AveragedMembers
-from armload.errors import IdentificationError
+from armload.errors import ArmError, IdentificationError
 from armload.identification import METHODS
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineEstimate, OnlineIdentifier
@@ -24,7 +24,7 @@ from armload.online.state import saved_at
 from armload.payloads import franka_hand
 from armload.payloads import test_payload as make_payload
 from armload.posterior import shipped_model
-from armload.recording import Sample
+from armload.recording import Sample, read_recording, write_recording
 from armload.simulation import World, simulate
 
 
@@ -86,6 +86,18 @@ def test_an_arm_with_a_known_tool_answers_relative_to_it(panda, log):
     identifier = OnlineIdentifier(panda.with_payload(franka_hand().parameters), method="map")
     assert fed(identifier, list(log)[:20]).relative_to == "tool"
     identifier.close()
+
+
+def test_a_name_and_a_path_stand_for_an_arm_and_its_tare_as_in_identify(panda, log, tmp_path):
+    path, world, said = tmp_path / "empty.csv", World.real_like(panda, seed=3), []
+    write_recording(path, simulate(panda, random_motion(panda, 5, duration=6.0), None, world=world, rate=200.0))
+    for named in (OnlineIdentifier("panda", path, "map"), OnlineIdentifier(panda, read_recording(path, panda), "map")):
+        said.append(fed(named, log.between(0.0, 1.0)))
+        named.close()
+    np.testing.assert_array_equal(said[0].phi, said[1].phi)
+    assert said[0].relative_to == "tare"
+    with pytest.raises(ArmError, match="unknown robot 'pandar'"):
+        OnlineIdentifier("pandar")
 
 
 def test_methods_that_cannot_run_live_are_not_offered(panda):

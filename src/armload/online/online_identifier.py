@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from armload.arms import Arm
+from armload.arms import arm as arm_named
 from armload.errors import IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification.choice import choose
@@ -25,7 +26,7 @@ from armload.online.thresholds import KIND_LATEST, SELDOM
 from armload.online.watch import PayloadWatch
 from armload.posterior import Known, PosteriorLeastSquares, Profile
 from armload.posterior.map import PUBLISH
-from armload.recording import Recording, Sample
+from armload.recording import Recording, Sample, read_recording
 
 # what an `OnlineEstimate` has of the judgement under the same name
 _JUDGED = ("determined", "held", "rests_on_prior", "torque_gain_std", "around", "before", "p_held")
@@ -34,16 +35,15 @@ _JUDGED = ("determined", "held", "rests_on_prior", "torque_gain_std", "around", 
 class OnlineIdentifier:
     """Payload identification on a live stream, with any method.
 
-    >>> from armload.arms import arm
-    >>> identifier = OnlineIdentifier(arm("panda"))
+    >>> identifier = OnlineIdentifier("panda")
     >>> estimate = identifier.update(0.0, [0, 0, 0, -1.5, 0, 1.5, 0], [0] * 7, [0, -24.9, 0, 22.4, 0, 2.5, 0])
     >>> estimate.held, estimate.moving, identifier.update(0.0, [0], None, "x").health.bad
     (False, False, 1)
 
     Args:
-        arm: the bare arm (or with a tool that is known), with the frame and gravity wanted.
-        tare: an earlier log of the same arm, on any motion, with whatever was mounted then: estimates are of what was
-            added since.
+        arm: the bare arm (or with a tool that is known), with the frame and gravity wanted; or as for `identify`.
+        tare: an earlier log of the same arm, or its path, on any motion, with whatever was mounted then: estimates are
+            of what was added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
         profile: what was learned of this arm from many logs; estimates are of what was added since.
         known: of a payload, apart from the stream; used while something is held and no sample contradicts (`notes`).
@@ -60,15 +60,17 @@ class OnlineIdentifier:
 
     def __init__(
         self,
-        arm: Arm,
-        tare: Recording | None = None,
+        arm: Arm | str | Path,
+        tare: Recording | str | Path | None = None,
         method: str | Path | None = None,
         profile: Profile | None = None,
         known: Known | None = None,
         every: float = PUBLISH,
         tare_age: float = 0.0,
     ) -> None:
-        self.arm, self.profile, self._tared = arm, profile, tare is not None
+        self.arm = arm = arm if isinstance(arm, Arm) else arm_named(arm)
+        tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
+        self.profile, self._tared = profile, tare is not None
         self._engine = first = choose(arm, tare, method, live=True, profile=profile).identifier
         know(first, known)
         if tare is not None and isinstance(first, PosteriorLeastSquares):
@@ -205,7 +207,7 @@ class OnlineIdentifier:
     def restore(
         cls,
         path: str | PathLike[str],
-        arm: Arm,
+        arm: Arm | str | Path,
         method: str | Path | None = None,
         profile: Profile | None = None,
         known: Known | None = None,
@@ -223,7 +225,7 @@ class OnlineIdentifier:
         """
         new = cls(arm, method=method, profile=profile, known=known, every=every)
         try:
-            saved = load_state(path, arm, new.method, new._engine)
+            saved = load_state(path, new.arm, new.method, new._engine)
         finally:
             new.close()
         new.__dict__.update(saved)
