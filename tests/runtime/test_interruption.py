@@ -30,13 +30,24 @@ def test_an_interruption_that_a_module_would_swallow_comes_afterwards():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGTERM])
-def test_a_signal_that_was_ignored_stays_so_while_others_are_held_back(number):
-    before = signal.signal(number, signal.SIG_IGN)
+def test_under_nohup_a_closed_terminal_stays_ignored_while_other_signals_are_held_back():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with held_back() as interruption:
-            signal.raise_signal(number)
+            signal.raise_signal(signal.SIGHUP)
         assert interruption.name is None
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_whoever_stops_what_a_shell_runs_in_the_background_is_heard(number):
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        with pytest.raises(KeyboardInterrupt), held_back() as interruption:
+            signal.raise_signal(number)
+        assert interruption.name == signal.Signals(number).name
         assert signal.getsignal(number) == signal.SIG_IGN
     finally:
         signal.signal(number, before)

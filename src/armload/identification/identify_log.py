@@ -92,7 +92,7 @@ def identify(
     arm = arm if isinstance(arm, Arm) else arm_named(arm)
     drawn = read_payload(body) if isinstance(body, str | Path) else body
     known = plausible_known(known_of(arm, mass, com, drawn, families(family)), arm)
-    if tare_age is not None and tare is None:
+    if tare_age and tare is None:
         raise IdentificationError(
             "tare_age says how old a tare is, but there is no tare: give it, or leave the age out"
         )

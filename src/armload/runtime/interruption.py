@@ -29,15 +29,16 @@ class Interruption:
 def held_back() -> Iterator[Interruption]:
     """Within, Ctrl-C (SIGINT), SIGTERM and SIGHUP are only noted; KeyboardInterrupt is raised at the end.
 
-    What is ignored goes on being so: a program under nohup is to outlive its terminal, also while an arm moves. In
-    another thread than the main one, where signals do not come, nothing is changed.
+    SIGHUP is ignored where it was (nohup): the program is to outlive its terminal, also while an arm moves. The others
+    are noted all the same: what a shell runs in the background ignores Ctrl-C, but whoever sends it wants the arm to
+    stop. In another thread than the main one, where signals do not come, nothing is changed.
     """
     interruption = Interruption()
     if threading.current_thread() is not threading.main_thread():
         yield interruption
         return
-    heard = [number for number in _SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
-    before = {number: signal.signal(number, interruption.heard) for number in heard}
+    ignored = (signal.SIGHUP,) if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else ()
+    before = {number: signal.signal(number, interruption.heard) for number in _SIGNALS if number not in ignored}
     try:
         yield interruption
     finally:
