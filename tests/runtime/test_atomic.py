@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from armload.runtime.atomic import clear_left_over, replacing
+from armload.runtime.atomic import clear_left_over, kept_alone, replacing
 
 WRITER = """
 import sys
@@ -140,3 +140,26 @@ def test_a_full_disk_is_an_error_of_the_file_that_was_wanted(tmp_path, why):
     with pytest.raises(OSError, match=r"space|exceeded|large") as caught, replacing(path):
         raise OSError(why, os.strerror(why))
     assert caught.value.filename == str(path)
+
+
+KILLED_WHILE_IT_KEPT = """
+import os, signal, sys
+from armload.runtime.atomic import kept_alone
+with kept_alone(sys.argv[1], 0.0):
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_who_keeps_a_file_alone_keeps_others_out_until_it_ends_however_it_does(tmp_path):
+    kept, said = tmp_path / "state.npz", r"another process keeps .*state\.npz: is the same one running twice"
+    with kept_alone(kept, 0.0):
+        with pytest.raises(BlockingIOError, match=said), kept_alone(kept, 0.1):
+            pass
+        with kept_alone(tmp_path / "other.npz", 0.0):
+            pass
+    assert subprocess.run([sys.executable, "-c", KILLED_WHILE_IT_KEPT, kept]).returncode == -signal.SIGKILL
+    with kept_alone(kept, 0.0):
+        assert [path.name for path in tmp_path.iterdir()] == [".state.npz.lock"]
+    assert not [*tmp_path.iterdir()]
+    with kept_alone(tmp_path / "none" / "state.npz", 0.0):  # no such folder yet: there is nothing to keep
+        pass

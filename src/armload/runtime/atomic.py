@@ -89,11 +89,11 @@ def kept_alone(path: str | Path, patience: float) -> Iterator[None]:
         patience: [s] another process is waited for.
 
     Raises:
-        BlockingIOError: it is still there.
+        BlockingIOError: it is still there; its text is a sentence.
     """
     path = Path(path)
     lock = path.with_name(f".{path.name}.lock")
-    handle = _locked(lock, patience)
+    handle = _locked(lock, path, patience)
     try:
         yield
     finally:
@@ -102,7 +102,7 @@ def kept_alone(path: str | Path, patience: float) -> Iterator[None]:
             os.close(handle)
 
 
-def _locked(lock: Path, patience: float) -> int | None:
+def _locked(lock: Path, path: Path, patience: float) -> int | None:
     until = time.monotonic() + patience
     while True:
         try:
@@ -117,7 +117,9 @@ def _locked(lock: Path, patience: float) -> int | None:
         except BlockingIOError:
             if time.monotonic() > until:
                 os.close(handle)
-                raise
+                raise BlockingIOError(
+                    f"another process keeps {path}: is the same one running twice? Stop one, or give it another folder"
+                ) from None
             time.sleep(_AGAIN)
         except OSError:  # a file system without locks
             lock.unlink(missing_ok=True)

@@ -22,7 +22,7 @@ from armload.arms import Arm
 from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
 from armload.devices.recorder import next_free
-from armload.errors import ArmloadError, IdentificationError, UsageError
+from armload.errors import ArmloadError, IdentificationError
 from armload.identification.tare_age import age_of, in_words
 from armload.online import OnlineEstimate, OnlineIdentifier
 from armload.online.state import saved_at
@@ -75,7 +75,8 @@ class ArmProcess:
 
     def run(self) -> None:
         """Until the source or standard input ends."""
-        with self._speaking(), self._alone():
+        state = self._state  # which another process would write over
+        with self._speaking(), contextlib.nullcontext() if state is None else kept_alone(state, _ENDS):
             self.source.start()  # it is opened while the state is read
             self.session = session = self._made_session()
             self._saved = time.monotonic()
@@ -119,20 +120,6 @@ class ArmProcess:
             yield
         finally:
             ended.set()
-
-    @contextlib.contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Within the block no other process keeps the same state: each would write over what the other saved."""
-        with contextlib.ExitStack() as held:
-            if self._state is not None:
-                try:
-                    held.enter_context(kept_alone(self._state, _ENDS))
-                except BlockingIOError:
-                    raise UsageError(
-                        f"another process keeps its state in {self._state}: is the service running already? Stop it, "
-                        "or give this one another folder"
-                    ) from None
-            yield
 
     def _beginning(self) -> Why:
         """Why there is no answer before there is a session."""
