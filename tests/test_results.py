@@ -1014,8 +1014,9 @@ def test_the_structure_and_what_the_rebuilt_estimator_costs_are_those_of_the_com
     assert "and no tare, {1:.0f} g instead of {0:.0f} with one".format(*1e3 * errors[0]) in page
     assert f"for the Panda at most {1e3 * np.max(errors[3:, 1] - errors[3:, 0]):.0f} g larger" in page
     times = result_of("nearest_body")["rows"]
-    assert all(4.0 < row["clarabel_over_nearest"] < 6.5 and row["clarabel_over_near"] > 10.0 for row in times)
-    assert "takes a fourth to a sixth of Clarabel's time, on a stream less than a tenth" in page
+    for key, parts in (("clarabel_over_nearest", [4, 5]), ("clarabel_over_near", [10, 17])):
+        assert [round(found) for found in (min(row[key] for row in times), max(row[key] for row in times))] == parts
+    assert "takes a fourth to a fifth of Clarabel's time, on a stream a tenth to a seventeenth" in page
 
 
 def test_the_table_of_an_update_s_cost_is_that_of_the_committed_benchmark():

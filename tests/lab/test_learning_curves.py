@@ -1,7 +1,6 @@
 """The parts of the learning curves: what a training holds, what is never seen by it, and what a row is."""
 
 import importlib
-import json
 from pathlib import Path
 
 import numpy as np
@@ -61,15 +60,9 @@ def test_trainings_of_another_size_are_measured_anew_and_the_physics_beside_them
     assert len({small[name] for name in changed}) == len(changed)
 
 
-def test_the_page_shows_the_committed_cells_and_says_what_they_say(monkeypatch):
-    monkeypatch.syspath_prepend(FOLDER)
-    page = importlib.import_module("learning_page")
-    cells = [
-        cell
-        for name in ("learning_curves", "learning_networks")
-        for cell in json.loads((FOLDER / "results" / f"{name}.json").read_text(encoding="utf-8"))["cells"]
-    ]
-    text = (FOLDER.parent / "docs" / "learning.md").read_text(encoding="utf-8")
+def test_the_page_shows_the_committed_cells_and_says_what_they_say(written):
+    page, text, *results = written("learning_page", "learning.md", "learning_curves", "learning_networks")
+    cells = [cell for result in results for cell in result["cells"]]
     assert page.table(cells) in text
     words = " ".join(text.split())
 

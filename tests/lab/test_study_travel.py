@@ -1,7 +1,6 @@
 """The paper's protocol on another arm and with other payloads."""
 
 import importlib
-import json
 from pathlib import Path
 
 import numpy as np
@@ -48,11 +47,9 @@ def test_another_arm_s_data_set_has_its_joints_and_hides_the_right_columns(tmp_p
         assert {name.rstrip("0123456789") for name in names[_columns(signal, 6)]} == {signal}
 
 
-def test_the_page_shows_the_committed_result_and_says_what_it_says(monkeypatch):
-    monkeypatch.syspath_prepend(FOLDER)
-    page = importlib.import_module("study_travel_page")
-    settings = json.loads((FOLDER / "results" / "study_travel.json").read_text(encoding="utf-8"))["settings"]
-    text = (FOLDER.parent / "docs" / "paper_travel.md").read_text(encoding="utf-8")
+def test_the_page_shows_the_committed_result_and_says_what_it_says(written):
+    page, text, result = written("study_travel_page", "paper_travel.md", "study_travel")
+    settings = result["settings"]
     assert page.groups(settings) in text
     assert page.each(settings) in text
     words, parameters = " ".join(text.split()), {c["id"]: c["parameter"] for c in page.load_claims()}

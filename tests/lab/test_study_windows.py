@@ -1,7 +1,6 @@
 """Windows of any motion and arm: what is in them, what their simplest physics finds, and what is judged."""
 
 import importlib
-import json
 from pathlib import Path
 
 import numpy as np
@@ -79,11 +78,9 @@ def test_every_cell_has_its_own_name_and_another_size_of_training_changes_learne
     assert {name for name in small if name.startswith(("judged", "shard"))} == same
 
 
-def test_the_page_shows_the_committed_cells_and_says_what_they_say(monkeypatch):
-    monkeypatch.syspath_prepend(FOLDER)
-    page = importlib.import_module("study_windows_page")
-    cells = json.loads((FOLDER / "results" / "study_windows.json").read_text(encoding="utf-8"))["cells"]
-    text = (FOLDER.parent / "docs" / "learning.md").read_text(encoding="utf-8")
+def test_the_page_shows_the_committed_cells_and_says_what_they_say(written):
+    page, text, result = written("study_windows_page", "learning.md", "study_windows")
+    cells = result["cells"]
     assert page.table(cells) in text
     assert page.gained(cells) in text
     words = " ".join(text.split())

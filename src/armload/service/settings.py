@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from armload.inertia import InertialParameters
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")  # a file's name has room for more beside it
-LEAST_EVERY = 0.02  # [s] more lines are more than anybody reads
+_LEAST_EVERY = 0.02  # [s] more lines are more than anybody reads
 READ = ("tare", "profile", "tool", "mounted", "body")  # files that an arm's process reads
 _PATHS = (*READ, "save", "record")
 NO_FILES = ("franka-hand", "test", "nothing")  # in the place of a payload's file
@@ -187,10 +187,8 @@ class ServiceSettings:
         if doubled := sorted({record for record in records if records.count(record) > 1}):
             raise UsageError(f"two arms are recorded in {doubled[0]}: give each a file of its own")
         check_service(self)
-        if not LEAST_EVERY <= self.every < math.inf:
-            raise UsageError(
-                f"every is {self.every:g} s: expected at least {LEAST_EVERY} s between two lines of an arm"
-            )
+        if not _LEAST_EVERY <= self.every < math.inf:
+            raise UsageError(f"every is {self.every:g} s: expected at least {_LEAST_EVERY} s between two lines")
         if self.webhook is not None:
             check_webhook(self.webhook, self.headers)
         if self.mqtt is not None:
@@ -205,7 +203,8 @@ class ServiceSettings:
 def _digest(path: Path) -> str:
     """SHA-256 of a file, or of all files in a folder, as a bag of ROS 2 is one."""
     if not path.is_dir():
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
     files = sorted(file for file in path.rglob("*") if file.is_file())
     return hashlib.sha256("".join(f"{file.relative_to(path)} {_digest(file)} " for file in files).encode()).hexdigest()
 

@@ -48,6 +48,7 @@ def on_flange(frame: str, to: str, arm: Arm | None) -> bool:
 
 
 def no_flange(load: Load, arm: Arm | None) -> SinkError:
+    """Why nothing is written of a load whose place on the controller's flange is not known, and what to name."""
     from armload.arms import ARMS
     from armload.errors import SinkError
 

@@ -66,7 +66,7 @@ def parser() -> Parser:
     add_tool_argument(parser)
     add("--save", type=output_folder, metavar="DIR", help="keep the state in this folder, every minute")
     add("--loop", action="store_true", help="replay a log again and again")
-    add("--every", type=at_least(0.02, float), metavar="S", help="seconds between lines of an arm (0.1)")
+    add("--every", type=at_least(0.0, float), metavar="S", help="seconds between lines of an arm (0.1)")
     add(
         "--apply",
         choices=("auto",),
