@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -485,6 +486,22 @@ def test_the_torque_scale_is_one_for_the_arm_itself_and_the_factor_for_another()
         other = robot.with_links(robot.link_parameters / factor)
         fit = torque_scale(replace(log, tau=robot.torque(*taie2024()(log.t))), other)
         assert fit.scale == pytest.approx(factor, rel=0.05)
+
+
+def test_sound_logs_hold_the_share_of_the_arms_own_torque_that_the_page_says(real, sound):
+    page = (Path(__file__).resolve().parents[2] / "docs/recordings.md").read_text(encoding="utf-8")
+    text = " ".join(page[page.index("For comparison, s of sound logs:") :].split())
+    said = re.search(
+        r"Panda (\S+), a real UR10e .*? (\S+) \(unloaded\) and (\S+) \(with 2.8 kg\), .*? payload "
+        r"(\S+) to (\S+) \(Panda\) and (\S+) to (\S+) \(UR10e\)\. The residual was below (\S+) in",
+        text,
+    )
+    assert said is not None
+    found = [torque_scale(log, robot) for robot, log in (real[name] for name in ("panda", "ur10e", "ur10e loaded"))]
+    made = [[torque_scale(log, robot) for log in logs] for robot, logs in sound.values()]
+    s = [fit.scale for fit in found] + [edge(fit.scale for fit in fits) for fits in made for edge in (min, max)]
+    assert [f"{x:.2f}" for x in s] == list(said.groups()[:7])
+    assert max(fit.misfit for fits in (found, *made) for fit in fits) < float(said[8])
 
 
 def test_windows_never_span_a_gap_and_integrate_exactly():
