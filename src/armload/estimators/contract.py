@@ -138,6 +138,8 @@ class Identifier(ABC):
     def update(self, sample: Sample) -> Estimate:
         """Take one sample (t, q, dq, tau) and return the estimate so far.
 
+        Times must rise from sample to sample: they are not checked here. `OnlineIdentifier` leaves out what does not.
+
         Raises:
             IdentificationError: it is no `Sample` of arrays, of another number of joints, or holds a number that is not
                 finite.
