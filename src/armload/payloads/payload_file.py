@@ -178,7 +178,7 @@ def read_content(path: str | Path) -> dict[str, Any]:
     if path.is_dir():
         raise PayloadError(f"payload file {path} is a folder: expected a JSON file")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin a text with a mark
     except FileNotFoundError:
         raise PayloadError(f"payload file {path} does not exist: expected a JSON file with a payload") from None
     except UnicodeDecodeError:
