@@ -47,6 +47,17 @@ def test_help_of_each_command_ends_with_examples_of_it(capsys, command):
     assert f"armload {command}" in out.split("examples:")[1]
 
 
+@pytest.mark.parametrize("columns", [80, 100, 200])
+@pytest.mark.parametrize("command", ["identify", "measure", "motion design"])
+def test_options_are_explained_in_lines_that_a_terminal_does_not_break(command, columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert main([*command.split(), "--help"]) == 0
+    lines = capsys.readouterr().out.partition("\nexamples:")[0].splitlines()
+    lengths = [len(line) for line in lines if line.startswith(" ")]  # of all but the sentence that says what it does
+    most = min(columns - 2, 110)
+    assert 0.8 * most < max(lengths) <= most
+
+
 def test_version_is_the_packages(capsys):
     assert main(["--version"]) == 0
     stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]

@@ -182,6 +182,7 @@ def test_each_library_of_a_wheel_says_what_numba_says(light, panda, analytic_log
 
 NEEDS = {
     "pyarrow": ["demo", "--quick", "--out", "demo"],
+    "scikit-learn": ["dataset", "--out", "{data}"],  # all of its extra, not what it happens to import first
     "mujoco": ["live", "--headless", "--duration", "0.1"],
     "panda-python": ["live", "panda://127.0.0.1", "--headless"],
     "viser": ["live", "{log}", "--robot", "panda"],
@@ -193,7 +194,8 @@ def test_what_needs_an_extra_says_in_one_sentence_how_to_install_it(light, panda
     """One process asks for all: none has what it needs, whatever was refused before."""
     log = tmp_path / "log.csv"
     write_recording(log, analytic_log(panda, duration=0.5))
-    asked = [[argument.format(log=log) for argument in arguments] for arguments in NEEDS.values()]
+    data = tmp_path / "data"
+    asked = [[argument.format(log=log, data=data) for argument in arguments] for arguments in NEEDS.values()]
     code = (
         "import contextlib, io, json\nfrom armload.app import main\nsaid = []\n"
         f"for argv in {asked!r}:\n"
@@ -210,6 +212,7 @@ def test_what_needs_an_extra_says_in_one_sentence_how_to_install_it(light, panda
         assert "Traceback" not in err
         (wanted,) = [r for e in PROJECT["optional-dependencies"].values() for r in e if r.startswith(f"{package}>")][:1]
         assert f"'{wanted.partition(';')[0].strip()}'" in line.partition("pip install ")[2]
+    assert not data.exists()
 
 
 def test_python_that_needs_an_extra_is_told_how_to_install_it(light):

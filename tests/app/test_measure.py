@@ -177,6 +177,18 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_made(arguments, said, mot
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small.json"]
 
 
+@pytest.mark.parametrize(
+    ("mass", "frame", "said"),
+    [(0.4, "panda_link5", "joints lie between the two"), (400.0, "panda_link8", "weighs 400 kg: expected at most")],
+)
+def test_what_cannot_have_been_mounted_is_refused_before_the_arm_moves(mass, frame, said, motion, tmp_path, capsys):
+    content = {"mass": mass, "com": [0, 0, 0.05], "inertia_com": np.diag([1e-3] * 3).tolist(), "frame": frame}
+    (tmp_path / "gripper.json").write_text(json.dumps(content))
+    mounted = ["--apply", "--mounted", str(tmp_path / "gripper.json")]
+    assert main(["measure", "sim", *QUICK, "--motion", motion, "--move", *mounted]) == 2
+    assert said in capsys.readouterr().err.splitlines()[-1]
+
+
 @pytest.mark.full  # some seconds
 def test_sigterm_while_the_payload_is_mounted_ends_as_ctrl_c_does(motion, tmp_path):
     logs = tmp_path / "logs"

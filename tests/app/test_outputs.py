@@ -32,6 +32,7 @@ def here(tmp_path, monkeypatch):
     for name in [*READ, *inside]:
         Path(name).write_text(f"of {name}")
     Path("list.txt").write_text("# one a line\nlogs/cell/a.csv\n")
+    Path("marked.txt").write_text("logs/cell/a.csv\n", encoding="utf-8-sig")
     Path("link.csv").symlink_to("a.csv")
     return tmp_path
 
@@ -103,6 +104,7 @@ def test_every_option_that_writes_is_looked_at_before_its_command_begins():
         "survey logs --robot panda --out logs/cell/a.csv",
         "survey logs/*/*.csv --robot panda --out logs/cell/a.csv",
         "survey @list.txt --robot panda --out logs/cell/a.csv",
+        "survey @marked.txt --robot panda --out logs/cell/a.csv",
         "survey @list.txt --robot panda --out list.txt",
         "survey logs --robot panda --tare {arm}.csv --out a.csv",
         "survey report s.html --out s.html",

@@ -534,6 +534,36 @@ def test_moments_that_a_part_leaves_smaller_than_their_intervals_are_said_to_be_
         assert HARDLY_KNOWN not in export_load(left + hand, "franka")
 
 
+def test_a_load_and_a_measured_part_are_as_uncertain_as_both_and_lack_what_either_lacks():
+    std = np.array([0.03, *[1e-3] * 9])
+    whole = Load(InertialParameters([0.12, *[0.0] * 3, 1e-4, 0, 0, 1e-4, 0, 1e-4]), std=std, relative_to="arm")
+    part = Load(
+        InertialParameters([0.02, *[0.0] * 3, 1e-5, 0, 0, 1e-5, 0, 1e-5]),
+        std=std,
+        determined=tuple([True] * 9 + [False]),
+        moment_widths=np.full(3, 1e-5),
+    )
+    rng = np.random.default_rng(0)
+    drawn = rng.normal(scale=std, size=(20_000, 10)) - rng.normal(scale=std, size=(20_000, 10))
+    for both in (whole - part, whole + part):
+        np.testing.assert_allclose(both.std, drawn.std(axis=0), rtol=0.03)
+        assert both.undetermined == ("Izz",)
+        assert "not determined by the log: Izz" in export_load(replace(both, parameters=skew_body()), "franka")
+    assert not whole.seems_nothing
+    assert (whole - part).seems_nothing  # 0.10 kg, three deviations of the two: 0.127 kg
+
+
+def test_a_part_says_how_well_it_is_known(tmp_path):
+    tool = {"mass": 0.7, "com": [0, 0, 0.05], "inertia_com": np.diag([1e-3, 1.2e-3, 1.5e-3]).tolist()}
+    (tmp_path / "tool.json").write_text(json.dumps(tool | {"std": {"mass": 0.02, "inertia": 0.4}}))
+    load = read_load(tmp_path / "tool.json")
+    assert load.std is not None
+    # moments of 1, 1.2 and 1.5 g·m², 95 % of which is ±1.96·0.4·1.23 g·m²: wider than any
+    assert load.std[0] == pytest.approx(0.02)
+    np.testing.assert_allclose(load.moment_widths, 2 * 1.96 * 0.4 * 3.7e-3 / 3, rtol=1e-3)
+    assert f"{HARDLY_KNOWN}: Ixx, Iyy, Izz" in "\n".join(load.description())
+
+
 def test_what_no_body_has_is_not_exported_and_the_nearest_body_is():
     phi = skew_body().phi.copy()
     phi[4:] *= 0.1  # less than the mass at its centre needs

@@ -139,6 +139,11 @@ def test_a_payload_file_that_cannot_be_used_says_why_in_one_sentence(tmp_path, c
     assert len(message) < 500
 
 
+def test_a_payload_file_may_begin_with_a_byte_order_mark(tmp_path):
+    (tmp_path / "tool.json").write_text('{"mass": 0.4, "com": [0, 0, 0.05]}', encoding="utf-8-sig")
+    assert read_payload(tmp_path / "tool.json").parameters.mass == 0.4
+
+
 def test_a_payload_file_that_is_not_there_or_not_text_says_so(tmp_path):
     with pytest.raises(PayloadError, match="does not exist"):
         read_payload(tmp_path / "none.json")

@@ -79,3 +79,65 @@ def test_an_answer_is_as_uncertain_as_its_tool(analytic_log, tared):
     added = unsure.covariance - exact.covariance
     expected = off.covariance(hand.parameters)
     np.testing.assert_allclose(np.diag(added), np.diag(expected), rtol=1e-6, atol=1e-12)
+
+
+def saved_answer(path, phi, covariance, frame, interval="calibrated"):
+    """A file with what of a saved result says how well it is known."""
+    path.write_text(
+        json.dumps({"phi": list(phi), "covariance": covariance.tolist(), "frame": frame, "interval": interval})
+    )
+    return path
+
+
+def drawn_covariance(phi):
+    """Some covariance of ten numbers, with errors of some percent that belong together."""
+    root = np.random.default_rng(4).normal(size=(10, 10)) * (0.02 * np.abs(phi) + 1e-5)[:, None]
+    return root @ root.T
+
+
+@pytest.mark.parametrize("frame", ["panda_link8", "panda_link7"])
+def test_an_answer_is_as_uncertain_as_the_identified_tool_that_it_is_less(analytic_log, tmp_path, frame):
+    panda, hand = arm("panda"), franka_hand().parameters
+    reach = 0.107 if frame == "panda_link7" else 0.0  # [m] of the flange beyond link 7 along z, axes parallel
+    own = InertialParameters(hand.phi).moved(np.eye(3), (0.0, 0.0, reach)).phi
+    covariance = drawn_covariance(own)
+    body = InertialParameters.from_com(1.0, COM, 1e-3 * np.eye(3), "panda_link8")
+    log = analytic_log(panda, body + hand, duration=1.0)
+    exact = identify(log, panda, tool=InertialParameters(own, frame), method="map")
+    unsure = identify(log, panda, tool=saved_answer(tmp_path / "tool.json", own, covariance, frame), method="map")
+    added = unsure.covariance - exact.covariance
+    turn = np.eye(4)  # (m, m·r) about the flange, of those about the tool's frame
+    turn[3, 0] = -reach
+    np.testing.assert_allclose(added[:4, :4], turn @ covariance[:4, :4] @ turn.T, rtol=1e-6, atol=1e-12)
+
+
+def test_what_is_less_an_approximate_answer_is_approximate(analytic_log, tmp_path):
+    panda, hand = arm("panda"), franka_hand().parameters
+    log = analytic_log(
+        panda, InertialParameters.from_com(1.0, COM, 1e-3 * np.eye(3), "panda_link8") + hand, duration=1.0
+    )
+    file, covariance = tmp_path / "tool.json", np.diag(1e-8 + 1e-4 * hand.phi**2)
+    for interval in ("calibrated", "approximate"):
+        saved_answer(file, hand.phi, covariance, "panda_link8", interval)
+        assert identify(log, panda, tool=file).interval == interval
+
+
+def test_a_saved_answer_stays_as_uncertain_when_it_is_written_again(tmp_path):
+    phi = franka_hand().parameters.phi
+    saved_answer(tmp_path / "held.json", phi, drawn_covariance(phi), "panda_link8", "approximate")
+    write_payload(tmp_path / "again.json", read_payload(tmp_path / "held.json"))
+    again = read_payload(tmp_path / "again.json")
+    np.testing.assert_array_equal(again.covariance, drawn_covariance(phi))
+    assert again.measured is not None
+    assert not again.measured.calibrated
+
+
+def test_a_covariance_that_is_none_is_refused_and_what_std_says_is_believed(tmp_path):
+    phi, file = franka_hand().parameters.phi, tmp_path / "held.json"
+    for wrong in (-np.eye(10), np.triu(np.full((10, 10), 0.1)) + np.eye(10)):
+        saved_answer(file, phi, wrong, "panda_link8")
+        with pytest.raises(PayloadError, match=r"held\.json: the covariance"):
+            read_payload(file)
+    saved_answer(file, phi, drawn_covariance(phi), "panda_link8")
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"std": {"mass": 0.02}}))
+    assert np.sqrt(read_payload(file).covariance[0, 0]) == pytest.approx(0.02)

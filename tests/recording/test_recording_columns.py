@@ -77,7 +77,8 @@ def test_a_toml_file_says_the_same_with_units_and_lists_of_names(tmp_path, log):
     lines += ['t_unit = "ms"', 'q_unit = "deg"', 'dq_unit = "deg/s"']
     (tmp_path / "flat.toml").write_text("\n".join(lines))
     (tmp_path / "table.toml").write_text("\n".join(['robot = "panda"', "[columns]", *lines]))
-    for name in ("flat.toml", "table.toml"):
+    (tmp_path / "marked.toml").write_text("\n".join(lines), encoding="utf-8-sig")  # as some editors save a text
+    for name in ("flat.toml", "table.toml", "marked.toml"):
         same(read_recording(path, PANDA, columns=tmp_path / name), log)
         same(read_recording(path, PANDA, columns=str(tmp_path / name)), log)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armload.devices import load_remarks as remarks_on
 from armload.errors import SinkError
-from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
+from armload.inertia import NAMES, Z95, InertialParameters, held, inertia_com_std, is_consistent, to_order
 from armload.payloads.payload_file import payload_from, read_content
 
 if TYPE_CHECKING:
@@ -117,9 +117,10 @@ class Load:
         what = "the tool" if self.relative_to == "tool" else "what was mounted then"
         return f"relative to the {_RELATIVE.get(self.relative_to, self.relative_to)}: {what} is not in it"
 
-    def __sub__(self, other: InertialParameters) -> Load:
+    def __sub__(self, other: InertialParameters | Load) -> Load:
         since = self.relative_to in ("tare", "profile", "before")  # what was mounted then is not in it, as before
-        left = self._changed(self.parameters - other, self.relative_to if since else "tool")
+        part = other if isinstance(other, Load) else Load(other)
+        left = self._changed(self.parameters - part.parameters, part, self.relative_to if since else "tool")
         if self.lacks is not None and left._is_no_body():
             raise SinkError(
                 f"what is left has a mass of {left.parameters.mass:.4g} kg and is no body: {self.lacks}; do not take "
@@ -127,8 +128,9 @@ class Load:
             )
         return left
 
-    def __add__(self, other: InertialParameters) -> Load:
-        return self._changed(self.parameters + other, "arm")
+    def __add__(self, other: InertialParameters | Load) -> Load:
+        part = other if isinstance(other, Load) else Load(other)
+        return self._changed(self.parameters + part.parameters, part, "arm")
 
     def about(self, frame: str | None, arm: Arm | None = None) -> Load:
         """The same load about another frame fixed to the arm's last moving link; see `about`.
@@ -196,8 +198,16 @@ class Load:
         away = (self._nearest() - self.parameters.phi) / np.maximum(self.std, 1e-9)
         return float(np.linalg.norm(away)) > _MISFIT
 
-    def _changed(self, parameters: InertialParameters, relative_to: str | None) -> Load:
-        return replace(self._with(parameters), relative_to=relative_to if self.relative_to else None)
+    def _changed(self, parameters: InertialParameters, part: Load, relative_to: str | None) -> Load:
+        """With a part more or less, whose errors are independent of its own."""
+        both = replace(
+            self,
+            determined=tuple(a and b for a, b in zip(self.determined, part.determined, strict=True)),
+            std=_beside(self.std, part.std),
+            moment_widths=_beside(self.moment_widths, part.moment_widths),
+            remarks=remarks_on.beside(self.remarks, part.remarks),
+        )
+        return replace(both._with(parameters), relative_to=relative_to if self.relative_to else None)
 
     def _with(self, parameters: InertialParameters) -> Load:
         """Other parameters, as uncertain as before: of smaller moments that may be more than they are."""
@@ -206,6 +216,13 @@ class Load:
             remarks = tuple(remark for remark in remarks if not remark.startswith(remarks_on.HARDLY_KNOWN))
             remarks += remarks_on.loose(np.diag(parameters.inertia_com), self.moment_widths, self.determined)
         return replace(self, parameters=parameters, remarks=remarks)
+
+
+def _beside(one: NDArray[np.float64] | None, other: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    """Both deviations together; None: nothing is measured."""
+    if one is None or other is None:
+        return other if one is None else one
+    return np.hypot(one, other)
 
 
 def about(parameters: InertialParameters, frame: str | None, arm: Arm | None = None) -> InertialParameters:
@@ -245,7 +262,7 @@ def counted_numbers(parameters: InertialParameters, order: str) -> list[float]:
 
 
 def read_load(path: str | Path) -> Load:
-    """The load in a file: what `armload identify --json` printed, or a payload file (which is known, not measured).
+    """The load in a file: what `armload identify --json` printed, or a payload file, known as well as it says.
 
     Raises:
         PayloadError: the file is missing or malformed, or no body can have its parameters.
@@ -260,7 +277,11 @@ def read_load(path: str | Path) -> Load:
     )
     determined = _flags(content, "determined", path)
     if determined is None:
-        return Load(parameters, robot=robot, relative_to=relative_to, remarks=remarks_on.assumed(payload))
+        load = Load(parameters, robot=robot, relative_to=relative_to, remarks=remarks_on.assumed(payload))
+        if not payload.covariance.any():
+            return load
+        widths = 2 * Z95 * inertia_com_std(parameters.phi, payload.covariance)[[0, 3, 5]]
+        return replace(load, std=np.sqrt(np.diag(payload.covariance)), moment_widths=widths)._with(parameters)
     std = None
     try:
         low, high = (np.array(content[key], dtype=float) for key in ("phi_low", "phi_high"))

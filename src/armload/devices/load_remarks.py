@@ -28,6 +28,14 @@ def assumed(payload: Payload) -> tuple[str, ...]:
     return () if payload.inertia_known else (INERTIA_ASSUMED,)
 
 
+def beside(own: tuple[str, ...], of_part: tuple[str, ...]) -> tuple[str, ...]:
+    """The remarks on a load and on a part that is added or taken off, but on the part's own inertia."""
+    from armload.payloads import INERTIA_ASSUMED
+
+    more = [each for each in of_part if each != INERTIA_ASSUMED and not each.startswith(HARDLY_KNOWN)]
+    return tuple(dict.fromkeys((*own, *more)))
+
+
 def without_moments(remark: str) -> str:
     """A remark without the moments of inertia that it names; empty: it is of nothing else."""
     from armload.payloads import INERTIA_ASSUMED

@@ -108,11 +108,15 @@ class Found(NamedTuple):
         """Whether a body explains what the log says."""
         return explained(self.estimate, self.unprojected)
 
-    def with_error(self, covariance: NDArray[np.float64]) -> Found:
-        """The same with one more error of phi, of that covariance (10, 10): of a tool that is not known exactly."""
+    def with_error(self, covariance: NDArray[np.float64], calibrated: bool = True) -> Found:
+        """The same with one more error of phi, of that covariance (10, 10): of a tool that is not known exactly.
+
+        calibrated: whether that covariance is.
+        """
         unprojected, log_only = (x and (x[0], x[1] + covariance) for x in (self.unprojected, self.log_only))
         estimate = replace(self.estimate, covariance=self.estimate.covariance + covariance)
-        return self._replace(estimate=estimate, unprojected=unprojected, log_only=log_only)
+        calibrated = calibrated and self.calibrated
+        return self._replace(estimate=estimate, unprojected=unprojected, log_only=log_only, calibrated=calibrated)
 
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""

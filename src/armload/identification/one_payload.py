@@ -49,15 +49,16 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
         relative_to = without if tare is None else "tare"
         return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)
     known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
-    unsure, error = None, np.zeros((10, 10))
+    unsure, error, trusted = None, np.zeros((10, 10)), True
     if isinstance(mounted, Payload):
-        error = _in_frame(arm, mounted.uncertainty.covariance(mounted.parameters), mounted.parameters.frame)
+        error = _in_frame(arm, mounted.covariance, mounted.parameters.frame)
+        trusted = mounted.measured is None or mounted.measured.calibrated
         if not mounted.inertia_known:
             notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
             unsure = known
     if tare is None and asked.profile is None:
         arm = arm.with_payload(known)
-        found = found_in(recording, arm, None, asked).with_error(error)
+        found = found_in(recording, arm, None, asked).with_error(error, trusted)
         return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
     carried, sure = _carries(arm, known, tare, asked.profile)
     before = "at the tare" if tare is not None else "in the profile's logs"
@@ -70,7 +71,7 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
     else:
         both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
         found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
-        found = found.with_error(error)
+        found = found.with_error(error, trusted)
         note, otherwise = f"the tool was mounted {since}: the answer is what was added since, less the tool", known.phi
         if found.estimate.phi[0] < -HELD * found.estimate.std[0]:
             note = (

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import solids
-from armload.payloads.uncertainty import Uncertainty
+from armload.payloads.uncertainty import Measured, Uncertainty
 
 _WATER = 1000.0  # [kg/m³]
 INERTIA_ASSUMED = "the inertia is not given: that of a ball as dense as water about the centre of mass is taken"
@@ -71,6 +71,7 @@ class Payload:
         boxes: what it looks like, if known; pictures only, the parameters are what counts.
         inertia_known: False where only mass and centre of mass are known, and the inertia is `without_inertia`'s.
         uncertainty: how well the rest is known.
+        measured: the same of one that was identified, in place of what is stated.
 
     Raises:
         PayloadError: no body can have these parameters.
@@ -81,6 +82,7 @@ class Payload:
     boxes: tuple[Box, ...] = ()
     inertia_known: bool = True
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    measured: Measured | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "boxes", tuple(self.boxes))
@@ -107,6 +109,11 @@ class Payload:
         radius = (3.0 * mass / (4.0 * np.pi * _WATER)) ** (1.0 / 3.0)
         ball = 0.4 * mass * radius**2 * np.eye(3)
         return cls(name, InertialParameters.from_com(mass, com, ball, frame), inertia_known=False)
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """How well it is known: of phi (10, 10), about its frame."""
+        return self.uncertainty.covariance(self.parameters) if self.measured is None else self.measured.covariance
 
     def __str__(self) -> str:
         return f"{self.name}: {self.parameters}"

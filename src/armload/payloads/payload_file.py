@@ -14,7 +14,7 @@ centre of mass. std says how well they are known (`Uncertainty`): a drawing is n
 mass and com are known, the inertia is assumed (`Payload.without_inertia`), and users of it say so. Everything else is
 optional, and other keys are ignored but for those that are nearly one of these. A mesh is a closed surface in a file
 beside this one, of one density: its mass or density and where it is are as of `from_mesh`. The JSON result of an
-identification reads as the payload it found.
+identification reads as the payload it found, as well known as its `covariance` says (`Measured`), unless std says it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from armload.errors import ArmloadError, PayloadError
 from armload.inertia import NAMES, InertialParameters
 from armload.payloads.mesh import from_mesh, require_no_drawing
 from armload.payloads.payload import Box, Payload, require_consistent
-from armload.payloads.uncertainty import Uncertainty
+from armload.payloads.uncertainty import Measured, Uncertainty
 from armload.runtime.atomic import replacing
 
 FORMAT = "armload-payload/1"
@@ -77,7 +77,7 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
                 f"gyration): expected at most {_WIDEST:g} m; is it in kg·m²?"
             )
         name, std = _text(content, "name", path) or path.stem, _uncertainty(content, path)
-        return Payload(name, parameters, _boxes(content, path), uncertainty=std)
+        return Payload(name, parameters, _boxes(content, path), uncertainty=std, measured=_measured(content, path))
     except PayloadError:
         raise
     except ArmloadError as error:  # a matrix that is not symmetric, say: name the file
@@ -155,6 +155,9 @@ def write_payload(path: str | Path, payload: Payload) -> None:
         del content["phi"], content["inertia_com"]
     if payload.uncertainty != Uncertainty():
         content["std"] = asdict(payload.uncertainty)
+    if (found := payload.measured) is not None:
+        interval = "calibrated" if found.calibrated else "approximate"
+        content |= {"covariance": found.covariance.tolist(), "interval": interval}
     if payload.boxes:
         content["boxes"] = [{"size": b.size, "centre": b.centre, "mass": b.mass} for b in payload.boxes]
     try:
@@ -175,7 +178,7 @@ def read_content(path: str | Path) -> dict[str, Any]:
     if path.is_dir():
         raise PayloadError(f"payload file {path} is a folder: expected a JSON file")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # some editors begin a text with a mark
     except FileNotFoundError:
         raise PayloadError(f"payload file {path} does not exist: expected a JSON file with a payload") from None
     except UnicodeDecodeError:
@@ -247,7 +250,8 @@ def _require_agreement(phi: InertialParameters, triple: InertialParameters, path
 
 
 def _numbers(value: Any, shape: tuple[int, ...], key: str, path: Path) -> NDArray[np.float64]:
-    expected = {(): "a number", (3,): "3 numbers", (10,): "10 numbers", (3, 3): "3 rows of 3 numbers"}[shape]
+    kinds = {(): "a number", (3,): "3 numbers", (10,): "10 numbers", (3, 3): "3 rows of 3 numbers"}
+    expected = kinds.get(shape, "10 rows of 10 numbers")
     leaves = _leaves(value)
     if any(leaf is None for leaf in leaves) and len(leaves) == 10 and shape == (10,):
         names = ", ".join(n for n, leaf in zip(NAMES, leaves, strict=True) if leaf is None)
@@ -289,6 +293,17 @@ def _uncertainty(content: dict[str, Any], path: Path) -> Uncertainty:
             "and inertia (a share)"
         )
     return Uncertainty(**{key: float(_numbers(value, (), f"std of {key}", path)) for key, value in std.items()})
+
+
+def _measured(content: dict[str, Any], path: Path) -> Measured | None:
+    """How well the payload of an answer is known; None: the file is of no answer, or says it otherwise."""
+    if content.get("covariance") is None or content.get("std") is not None:
+        return None
+    covariance = _numbers(content["covariance"], (10, 10), "covariance", path)
+    try:
+        return Measured(covariance, content.get("interval") != "approximate")
+    except PayloadError as error:
+        raise PayloadError(f"payload file {path}: {error}") from None
 
 
 def _boxes(content: dict[str, Any], path: Path) -> tuple[Box, ...]:

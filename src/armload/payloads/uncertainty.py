@@ -1,5 +1,7 @@
 """How well a tool is known: a covariance of phi from what is said of its mass, its centre and its inertia.
 
+Of one that was identified, its own answer says it (`Measured`).
+
 To first order, with m, r, I_c independent and δ their errors,
 
     δ(m·r) = r·δm + m·δr,    δI = δI_c + ([r]²_×)·δm + m·δ([r]²_×),    [r]²_× = rᵀ·r·1 − r·rᵀ
@@ -16,6 +18,7 @@ from armload.errors import PayloadError
 from armload.inertia import InertialParameters, com_to_phi, inertia_matrix, vech
 
 _STEP = 1e-6  # of a difference quotient: phi is of second degree in r, so that a central one is exact but for rounding
+_ROUNDING = 1e-6  # of a correlation: what printed digits leave
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,30 @@ class Uncertainty:
             columns.append(size * (_phi(x + step) - _phi(x - step)) / (2.0 * _STEP))
         J = np.column_stack(columns)
         return J @ J.T
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """How well a body is known that was identified.
+
+    Args:
+        covariance: of phi (10, 10), about the frame of the body.
+        calibrated: whether the intervals of the answer are.
+
+    Raises:
+        PayloadError: the covariance is not one.
+    """
+
+    covariance: NDArray[np.float64]
+    calibrated: bool = True
+
+    def __post_init__(self) -> None:
+        scale = np.sqrt(np.abs(np.diag(self.covariance)))
+        unit = self.covariance / np.outer(scale, scale).clip(np.finfo(float).tiny)
+        if not np.allclose(unit, unit.T, atol=_ROUNDING) or np.linalg.eigvalsh(unit)[0] < -_ROUNDING:
+            raise PayloadError(
+                "the covariance of phi is none: expected a symmetric matrix (10, 10) without eigenvalues below zero"
+            )
 
 
 def _phi(x: NDArray[np.float64]) -> NDArray[np.float64]:

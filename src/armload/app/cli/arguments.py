@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 from collections.abc import Callable
 from importlib import resources
 from typing import NoReturn, TypeVar
@@ -12,6 +13,7 @@ from armload.errors import IdentificationError, UsageError
 T = TypeVar("T")
 # options whose value may begin with a minus sign: argparse would take "-1,0,-9.7" for an option
 _SIGNED = ("--gravity", "--mass", "--from", "--at", "--box", "--floor", "--centre", "--com")
+_HELP = 110  # characters of a line of --help, at most
 COLUMNS = 'names and units of columns, such as "t=time,q=joint_pos_{i},t_unit=ms", or a TOML file'
 AS_NAMED = "none"  # as SPEC: nothing is said of the columns
 # of a log that is a table: what `add_column_arguments` adds, those of the tare last
@@ -35,7 +37,9 @@ class Parser(argparse.ArgumentParser):
 
 class _Help(argparse.RawDescriptionHelpFormatter):
     def __init__(self, prog: str) -> None:
-        super().__init__(prog, max_help_position=28, width=110)
+        # as wide as a narrow terminal is, less argparse's own margin; elsewhere, as in a pipe, lines of 110 characters
+        width = shutil.get_terminal_size((_HELP + 2, 24)).columns - 2
+        super().__init__(prog, max_help_position=28, width=min(width, _HELP))
 
 
 def attach_values(arguments: list[str]) -> list[str]:

@@ -67,8 +67,10 @@ def run(options: argparse.Namespace) -> None:
     """Build the data set and say what it holds."""
     from armload.lab.dataset import build_dataset
     from armload.payloads import Payload, container_loadings, random_payloads
+    from armload.runtime.extras import require
     from armload.simulation import Sensors
 
+    require("scipy", "pyarrow")  # before there is a folder
     arm = arm_of(options)
     payloads: list[Payload] = []
     for name in options.payloads:

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import Parser, file_name, output_file
 from armload.app.cli.export_frame import frame_for, no_flange, on_flange
-from armload.app.cli.named import payload_of
+from armload.app.cli.named import load_of, part_of
 from armload.app.cli.printing import print_note
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
     from armload.devices import Load
-    from armload.inertia import InertialParameters
 
 # when what is not in a load was mounted, by what it is relative to
 _SINCE = {"tare": "at the tare", "before": "at the tare", "profile": "in the profile's logs"}
@@ -87,12 +86,10 @@ def parser() -> Parser:
 def run(options: argparse.Namespace) -> None:
     """Read, combine, move, write."""
     from armload.arms import ARMS
-    from armload.devices import Load, read_load
     from armload.payloads import NOTHING
 
     arm = None if options.robot is None else _arm(options.robot, options.frame)
-    built_in = options.result in ("franka-hand", "test")
-    load = Load(payload_of(options.result, arm)) if built_in else read_load(options.result)
+    load = load_of(options.result, arm)
     facts = ARMS.get(load.robot or "")
     if arm is None and facts is not None and _moves(options, load.frame, facts.flange):
         arm = _arm(facts.name)
@@ -176,24 +173,18 @@ def _moves(options: argparse.Namespace, frame: str | None, flange: str) -> bool:
     return frame != flange or options.frame not in (None, flange) or bool(options.minus or options.plus)
 
 
-def _part(name: str, load: Load, arm: Arm | None) -> InertialParameters:
-    """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called.
-
-    Raises:
-        IdentificationError: the arm cannot carry it: it is given in grams, say.
-    """
-    from armload.devices import about
-    from armload.identification import plausible_tool
+def _part(name: str, load: Load, arm: Arm | None) -> Load:
+    """A part about the load's own frame; the Franka Hand sits on the flange, whatever that is called."""
+    from armload.devices import Load
     from armload.inertia import InertialParameters
     from armload.payloads import NOTHING, franka_hand
     from armload.payloads.hand import HAND, fits
 
     if name == NOTHING:
-        return InertialParameters.zero(load.frame)
+        return Load(InertialParameters.zero(load.frame))
     if name == HAND and load.frame is not None and fits(load.frame):
-        return franka_hand(load.frame).parameters
-    part = about(payload_of(name, arm), load.frame, arm)
-    return part if arm is None else plausible_tool(part, arm)
+        return Load(franka_hand(load.frame).parameters)
+    return part_of(name, load.frame, arm)
 
 
 def _doubts(parts: list[str], load: Load) -> list[str]:

@@ -16,6 +16,7 @@ from armload.app.cli.named import (
     arm_of,
     boxes_of,
     motion_of,
+    part_of,
     payload_of,
     read_logs,
     robot_of,
@@ -65,7 +66,7 @@ def run(options: argparse.Namespace) -> int | None:
     body = None if options.body is None else read_payload(options.body)
     known = {"mass": mass, "com": com, "body": body, "family": options.family, "method": options.method}
     Basis(**known).known(arm)  # before a motion is designed for it
-    mounted = tool if options.mounted in (None, "nothing") else payload_of(options.mounted, arm)
+    mounted = tool if options.mounted in (None, "nothing") else part_of(options.mounted, arm.frame, arm)
     check_tare_age(options)
     _, tare = read_logs(options, arm, None, options.tare)
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"

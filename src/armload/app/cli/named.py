@@ -14,6 +14,7 @@ from armload.errors import NoEpisodesError, RecordingError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
+    from armload.devices import Load
     from armload.excitation import Obstacle, Surroundings
     from armload.inertia import InertialParameters
     from armload.lab.dataset import Dataset
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from armload.simulation import World
 
 _SIMULATED = "panda"
+_BUILT_IN = ("franka-hand", "test")  # payloads that need no file
 
 
 def columns_of(options: argparse.Namespace, of_tare: bool = False) -> ColumnSpec:
@@ -172,6 +174,31 @@ def payload_of(name: str, arm: Arm | None = None) -> InertialParameters:
     if not payload.inertia_known:
         print_note(f"{name}: {INERTIA_ASSUMED}")
     return payload.parameters
+
+
+def load_of(name: str, arm: Arm | None = None) -> Load:
+    """What is told to a controller: a payload file, a saved result or a built-in payload, with how well it is known."""
+    from armload.devices import Load, read_load
+
+    return Load(payload_of(name, arm)) if name in _BUILT_IN else read_load(name)
+
+
+def part_of(name: str, frame: str | None, arm: Arm | None) -> Load:
+    """The same about a frame, to be added to a load or taken off it; a note says where its inertia is an assumption.
+
+    Raises:
+        IdentificationError: the arm cannot carry it: it is given in grams, say.
+    """
+    from armload.identification import plausible_tool
+    from armload.payloads import INERTIA_ASSUMED
+
+    part = load_of(name, arm)
+    if INERTIA_ASSUMED in part.remarks:
+        print_note(f"{name}: {INERTIA_ASSUMED}")
+    part = part.about(frame, arm)
+    if arm is not None:
+        plausible_tool(part.parameters, arm)
+    return part
 
 
 def robot_of(source: str) -> str:

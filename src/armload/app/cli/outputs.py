@@ -191,7 +191,7 @@ def _named(text: str, lists: tuple[str, ...] = ()) -> Iterator[Path]:
         if os.path.isfile(text[1:]) and text not in lists:
             yield Path(text[1:])
             with suppress(OSError, UnicodeDecodeError):  # the command will say so
-                for line in Path(text[1:]).read_text(encoding="utf-8").splitlines():
+                for line in Path(text[1:]).read_text(encoding="utf-8-sig").splitlines():
                     yield from () if line.startswith("#") else _named(line.strip(), (*lists, text))
         return
     text = text.removeprefix("file://")
