@@ -72,6 +72,7 @@ class Found(NamedTuple):
     known: of the payload apart from the log. log_only: mean (10,) and covariance (10, 10) without that. denies_family:
         whether the log denies the families that were given.
     health: the arm itself, of a method that asks.
+    arm_known: what it is held against by `drift` and `another`: "tare", "profile", or "both".
     """
 
     estimate: Estimate
@@ -102,6 +103,7 @@ class Found(NamedTuple):
     gain_std: float | None = None
     gain_known: bool = False
     health: ArmHealth | None = None
+    arm_known: str = "tare"
 
     @property
     def explained(self) -> bool:
@@ -147,11 +149,12 @@ def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Aske
 def _found_on_side(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
     """The same, whichever side of the gears the torque is measured on."""
     found = _found(choose(arm, tare, asked.method, profile=asked.profile), arm, recording, asked)
+    known = "tare" if asked.profile is None else "profile" if tare is None else "both"
     if found.unknown_friction:
         motor_side = replace(arm, motor_torque=True)
         found = _found(choose(motor_side, tare, asked.method, profile=asked.profile), motor_side, recording, asked)
         found = found._replace(friction_found=True)
-    return found
+    return found._replace(arm_known=known)
 
 
 def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Found:
