@@ -27,6 +27,16 @@ def of_motors(profile: Profile) -> bool:
     return profile.arm_name in ARMS and ARMS[profile.arm_name].torque_side == "motor"
 
 
+def in_time(profile: Profile) -> Profile:
+    """The same with its sessions in the order of their dates, for people; one without a date stays in its place."""
+    from dataclasses import replace
+
+    dated = [session for session in profile.sessions if session.date is not None]
+    dated.sort(key=lambda session: session.date or 0.0)
+    rest = iter(dated)
+    return replace(profile, sessions=tuple(one if one.date is None else next(rest) for one in profile.sessions))
+
+
 def fields_of(profile: Profile) -> dict[str, Any]:
     """The profile as one JSON object."""
     from dataclasses import asdict
