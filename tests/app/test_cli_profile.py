@@ -77,6 +77,7 @@ def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_pa
     said = capsys.readouterr()
     assert "3 sessions, 18 s" in said.out
     assert "day2.csv" in said.out
+    assert "learn a new profile of all these logs" in said.err  # of three
     assert figure.read_bytes()[:4] == b"\x89PNG"
     assert main(["profile", "show", str(profile), "--json"]) == 0
     fields = json.loads(capsys.readouterr().out)

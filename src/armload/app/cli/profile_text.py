@@ -137,7 +137,10 @@ def next_steps(profile: Profile) -> tuple[str, ...]:
     if len(profile.sessions) < 4:
         count = len(profile.sessions)
         few = "one session does not tell" if count == 1 else f"{count} sessions do not tell"
-        advice.append(f"{few} how the arm drifts: record it on four days or more")
+        advice.append(
+            f"{few} how the arm drifts, nor how far a log can be trusted: record it on four days or more, and learn a "
+            "new profile of all these logs, as --update keeps what was chosen for the first"
+        )
     moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
     still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
     if still:
