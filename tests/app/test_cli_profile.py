@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from armload.app.cli import main
+from armload.app.cli.live import _learn
 from armload.app.cli.profile_text import next_steps, of_motors, print_profile
 from armload.arms import arm
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, save_motion, taie2024
+from armload.online import OnlineIdentifier
 from armload.payloads import hand_on
 from armload.payloads import test_payload as make_payload
-from armload.posterior import load_profile
+from armload.posterior import load_profile, save_profile
 from armload.recording import write_recording
 from armload.simulation import Run, World, simulate_many
 from armload.simulation.resolution import COARSE
@@ -73,6 +77,7 @@ def test_show_says_what_is_known_and_how_the_arm_drifted(profile, capsys, tmp_pa
     said = capsys.readouterr()
     assert "3 sessions, 18 s" in said.out
     assert "day2.csv" in said.out
+    assert "learn a new profile of all these logs" in said.err  # of three
     assert figure.read_bytes()[:4] == b"\x89PNG"
     assert main(["profile", "show", str(profile), "--json"]) == 0
     fields = json.loads(capsys.readouterr().out)
@@ -130,6 +135,15 @@ def test_logs_are_added_about_the_profile_s_own_frame(folder, profile, capsys, t
     assert "--frame panda_link7 is not the profile's" in capsys.readouterr().err
     assert path.read_bytes() == profile.read_bytes()
     assert main([*update, "panda_link8"]) == 0
+
+
+def test_sessions_are_shown_in_the_order_of_their_dates(profile, capsys, tmp_path):
+    known, path = load_profile(profile), tmp_path / "dated.profile"
+    dates = {"day0.csv": 1.8e9, "day1.csv": None, "day2.csv": 1.7e9}
+    sessions = [replace(one, date=dates[one.name.rsplit("/", 1)[-1]]) for one in known.sessions]
+    save_profile(replace(known, sessions=tuple(sessions)), path)
+    assert main(["profile", "show", str(path)]) == 0
+    assert re.findall(r"day\d\.csv", capsys.readouterr().out) == ["day2.csv", "day1.csv", "day0.csv"]
 
 
 def test_a_session_of_several_logs_is_shown_with_all_their_names(folder, capsys, tmp_path):
@@ -200,7 +214,7 @@ def test_update_adds_a_session_and_refuses_a_payload(folder, profile, capsys, tm
             "leave --one-session out",
         ),
         (["profile", "day0.csv"], "needs --robot"),
-        (["profile", "day0.csv", "--robot", "panda", "--out", "none.profile", "--update"], "no profile at"),
+        (["profile", "day0.csv", "--robot", "panda", "--out", "none.profile", "--update"], "leave --update out"),
         (["profile", "day3.csv", "--robot", "panda", "--out", "arm.profile"], "arm.profile exists: give --update"),
         (["profile", "day1.csv", "--robot", "panda", "--out", "arm.profile", "--update"], "holds measurements of"),
         (["profile", "day3.csv", "day3.csv", "--robot", "panda", "--out", "new.profile"], "holds measurements of"),
@@ -283,6 +297,36 @@ def test_a_stream_adds_to_what_its_profile_s_file_holds_when_it_ends(folder, lon
     assert main(argv) == 0
     names = [session.name.rsplit("/", 1)[-1] for session in load_profile(path).sessions]
     assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
+
+
+@pytest.mark.full  # some seconds
+def test_what_is_added_while_a_stream_s_own_is_learned_is_kept(folder, long, profile, tmp_path, monkeypatch):
+    path, learned, added = tmp_path / "shared.profile", OnlineIdentifier.learned, []
+    path.write_bytes(profile.read_bytes())
+
+    def meanwhile(*given):
+        made = learned(*given)
+        if not added:
+            added.append(
+                main(["profile", str(folder / "day3.csv"), "--robot", "panda", "--out", str(path), "--update"])
+            )
+        return made
+
+    monkeypatch.setattr(OnlineIdentifier, "learned", meanwhile)
+    argv = ["live", long, "--robot", "panda", "--profile", str(path), "--learn", "--headless", "--speed", "max"]
+    assert main(argv) == 0
+    names = [session.name.rsplit("/", 1)[-1] for session in load_profile(path).sessions]
+    assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
+
+
+def test_sessions_of_one_robot_s_streams_are_told_apart_by_when_they_were(profile, tmp_path, capsys):
+    path, known = tmp_path / "arm.profile", load_profile(profile)
+    named = SimpleNamespace(learned=lambda name, now: replace(now, sessions=(replace(known.sessions[0], name=name),)))
+    path.write_bytes(profile.read_bytes())
+    _learn(SimpleNamespace(source=SimpleNamespace(name="panda://10.0.0.2"), identifier=named), str(path))
+    capsys.readouterr()
+    assert main(["profile", "show", str(path)]) == 0
+    assert re.search(r"10\.0\.0\.2 20\d\d-\d\d-\d\d \d\d:\d\d", capsys.readouterr().out)
 
 
 @pytest.mark.full  # some seconds

@@ -259,6 +259,18 @@ def test_another_arm_is_said_not_to_be_the_profile_s(panda, life, young):
     answer = identify(log, panda, profile=young)
     assert answer.interval == "approximate"
     assert "not as its profile says" in answer.notes[0]
+    tool = InertialParameters.from_com(0.5, (0.0, 0.0, 0.05), 1e-3 * np.eye(3))
+    assert "not as its profile says" in identify(log, panda, profile=young, tool=tool).notes[0]
+
+
+def test_an_arm_that_was_exchanged_before_its_tare_needs_no_other_tare_but_no_profile(panda, life, young):
+    other = World.real_like(panda, seed=4711)
+    load = InertialParameters(life[0].payload.parameters.phi)
+    log, tare = (simulated(panda, [other], [life[0].motion], what, 4.0, seed=7)[0] for what in (load, None))
+    note = identify(log, panda, tare=tare, profile=young).notes[0]
+    assert "not as its profile says" in note
+    assert "leave the profile out" in note
+    assert not any("not as" in note for note in identify(log, panda, tare=tare).notes)
 
 
 def test_a_tare_that_carries_something_beside_is_refused(panda, run, young, life):

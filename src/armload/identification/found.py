@@ -15,10 +15,10 @@ from armload.identification.arm_health import ArmHealth
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
-from armload.identification.thresholds import BACKWARDS, LARGEST_OFFSET, LEAST_SEEN, MISFIT, MOVES
+from armload.identification.shown_friction import driven_joints, is_frictionless
+from armload.identification.thresholds import LARGEST_OFFSET, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
-from armload.posterior.calibration import KAPPA_UNKNOWN
 from armload.posterior.restless import most_restless
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import TURNED, TURNS
@@ -72,6 +72,7 @@ class Found(NamedTuple):
     known: of the payload apart from the log. log_only: mean (10,) and covariance (10, 10) without that. denies_family:
         whether the log denies the families that were given.
     health: the arm itself, of a method that asks.
+    arm_known: what it is held against by `drift` and `another`: "tare", "profile", or "both".
     """
 
     estimate: Estimate
@@ -102,6 +103,7 @@ class Found(NamedTuple):
     gain_std: float | None = None
     gain_known: bool = False
     health: ArmHealth | None = None
+    arm_known: str = "tare"
 
     @property
     def explained(self) -> bool:
@@ -151,11 +153,12 @@ def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Aske
 def _found_on_side(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
     """The same, whichever side of the gears the torque is measured on."""
     found = _found(choose(arm, tare, asked.method, profile=asked.profile), arm, recording, asked)
+    known = "tare" if asked.profile is None else "profile" if tare is None else "both"
     if found.unknown_friction:
         motor_side = replace(arm, motor_torque=True)
         found = _found(choose(motor_side, tare, asked.method, profile=asked.profile), motor_side, recording, asked)
         found = found._replace(friction_found=True)
-    return found
+    return found._replace(arm_known=known)
 
 
 def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Found:
@@ -181,8 +184,8 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         weak_std=identifier.weak_std,
         unprojected=identifier.unprojected,
         offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
-        backwards=() if posterior is None else _backwards(posterior, recording, kappa),
-        frictionless=posterior is not None and _frictionless(posterior, recording),
+        backwards=() if posterior is None else driven_joints(posterior, recording, kappa),
+        frictionless=posterior is not None and is_frictionless(posterior, recording),
         strange_links=0.0 if mismatch is None or mismatch.torque == "motor" else _strange(mismatch.links),
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
         known_arm_std=identifier.known_arm_std,
@@ -208,25 +211,6 @@ def _restless_joint(found: PosteriorLeastSquares) -> int:
     if not stream.restlessness:
         return 0
     return most_restless(found.posterior.power, stream.noise.residual * stream.correction.effort)
-
-
-def _backwards(found: PosteriorLeastSquares, recording: Recording, kappa: float | None) -> tuple[int, ...]:
-    """Joints, from 1, that move, and whose Coulomb friction surely has the sign of one that drives them.
-
-    kappa: by how much the physics overrates the log's evidence; None: not known. Of motor currents, which are mostly
-        friction, it says nothing of that.
-    """
-    motor = found.posterior.torque == "motor"
-    coulomb, sure = found.stream.correction.coulomb, BACKWARDS * (1.0 if motor else np.sqrt(kappa or KAPPA_UNKNOWN))
-    driven = coulomb(found.posterior.eta) < -sure * coulomb(found.posterior.eta_std)
-    return tuple((np.flatnonzero(driven & (span(recording.q) > MOVES)) + 1).tolist())
-
-
-def _frictionless(found: PosteriorLeastSquares, recording: Recording) -> bool:
-    """Whether half of the joints move at least, and no such joint shows friction."""
-    correction, moves = found.stream.correction, span(recording.q) > MOVES
-    rubs = np.abs(correction.coulomb(found.posterior.eta)) > LEAST_SEEN * correction.effort
-    return 2 * moves.sum() >= len(moves) and not rubs[moves].any()
 
 
 def _strange(links: float) -> float:

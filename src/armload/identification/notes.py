@@ -152,23 +152,29 @@ def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "ta
 
     Args:
         drift, another: what the two tests of it found; None: they were not made.
+        what: "profile", "both" (a profile, which log and tare, of one session, are held against) or else the tare.
     """
-    then = "its profile says" if what == "profile" else "it was at its tare"
+    as_it_is = "learn a profile of this arm" if what == "profile" else "record a tare of this arm as it is now"
+    then = "the arm is not as its profile says" if what == "profile" else "the arm is not as it was at its tare"
+    if what == "both":
+        then = "in this log and at its tare the arm is not as its profile says"
+        as_it_is = "leave the profile out, or learn one of this arm as it is now"
     if another is not None and another.found:
-        say = "learn a profile of this arm" if what == "profile" else "record a tare of this arm as it is now"
         rest = "do without" if another.left_out else "still rest on"
         is_another = "it is another one, or was repaired" if another.sure else "it may be another one, or was repaired"
         return (
-            f"the arm is not as {then}: {is_another}, as its links, gears or torque sensors differ; the intervals "
-            f"{rest} what was known of it; {say}"
+            f"{then}: {is_another}, as its links, gears or torque sensors differ; the intervals "
+            f"{rest} what was known of it; {as_it_is}"
         )
     if drift is None or not drift.changed:
         return None
     j, allow = drift.joint, "allow for it, but not for another arm's links" if drift.allowed else "do not allow for it"
     offset, friction = (f"{x:+.2g} N·m" if abs(x) >= 5e-4 else "nothing" for x in (drift.offset[j], drift.coulomb[j]))
+    if what != "both":  # a profile is of many days: what has changed within one is measured sooner
+        as_it_is = "record a tare of this arm as it is now, with the same base and tool"
     return (
-        f"the arm is not as {then}: at joint {j + 1} the torque's offset differs by {offset}, the friction by "
-        f"{friction}; the intervals {allow}; record a tare of this arm as it is now, with the same base and tool"
+        f"{then}: at joint {j + 1} the torque's offset differs by {offset}, the friction by "
+        f"{friction}; the intervals {allow}; {as_it_is}"
     )
 
 

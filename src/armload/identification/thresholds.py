@@ -26,9 +26,9 @@ LARGEST_OFFSET = 5.0
 # joints is 2.3e-3, of their wrists 2e-2; a model's torque leaves 2e-4
 # (test_a_torque_that_is_computed_and_not_measured_is_told_by_its_lack_of_friction)
 LEAST_SEEN = 1e-3
-# [standard deviations] by which Coulomb friction that is found lies on the side that drives its joint: friction brakes.
-# Of sound logs of a second and more, simulated and real, it is at most 2.6 (a KUKA's of unfiltered velocities), with a
-# wrist torque's sign turned 1 to 25, of motor currents 2.5 to 14
+# [standard deviations] by which friction is found to drive its joint, where it must brake it: its work over the path
+# (`identification.shown_friction`). Of sound logs of 1 to 8 s, simulated (36 of five arms) and real, it is at most 1,
+# but for 4 in one window of a KUKA's unfiltered velocities; with a wrist torque's sign turned 1 to 140
 # (test_friction_that_drives_a_joint_is_told_by_the_joint, `benchmarks/wrong_logs.py`)
 BACKWARDS = 3.0
 # [rad] a joint that stays within so much stands: friction below stiction holds it

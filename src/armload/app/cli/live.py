@@ -21,7 +21,7 @@ from armload.app.cli.arguments import (
     output_file,
 )
 from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
-from armload.app.cli.outputs import check_output
+from armload.app.cli.outputs import check_output, contents_of
 from armload.app.cli.printing import notes_aside, print_note
 from armload.errors import ArmloadError, IdentificationError, ModelError, UsageError
 from armload.runtime.interruption import ended_by_sigterm, held_back
@@ -261,15 +261,19 @@ def _learn(session, path: str) -> None:
     """Add what the stream has shown of the empty arm to a profile's file."""
     from armload.posterior import load_profile, save_profile
 
-    try:  # to what the file holds now: another program may have added to it while the stream ran
-        now = load_profile(path) if os.path.exists(path) else None
-        profile = session.identifier.learned(session.source.name, now)
-    except (IdentificationError, ModelError) as error:
-        print_note(f"{path} is as it was: {error}")
-        return
-    if profile is None:
-        print_note(f"{path} is as it was: the stream showed no 20 s of the empty arm as the profile knows it")
-        return
+    name, before = session.source.name, b"not read yet"
+    if not os.path.exists(name):  # else of a log, which has a name of its own
+        name = f"{name} {time.strftime('%Y-%m-%d %H:%M')}"
+    while before != (before := contents_of(path)):  # another program may add to it, also meanwhile
+        try:
+            now = load_profile(path) if os.path.exists(path) else None
+            profile = session.identifier.learned(name, now)
+        except (IdentificationError, ModelError) as error:
+            print_note(f"{path} is as it was: {error}")
+            return
+        if profile is None:
+            print_note(f"{path} is as it was: the stream showed no 20 s of the empty arm as the profile knows it")
+            return
     save_profile(profile, path)
     print_note(f"{path}: learned {profile.sessions[-1].duration:.0f} s of the empty arm")
 

@@ -19,7 +19,7 @@ from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, payload_of, read_logs
 from armload.app.cli.outputs import check_unchanged, contents_of
 from armload.app.cli.printing import print_json, print_note, working
-from armload.app.cli.profile_text import fields_of, of_motors, print_profile
+from armload.app.cli.profile_text import fields_of, in_time, of_motors, print_profile
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -86,6 +86,10 @@ def run(options: argparse.Namespace) -> None:
         raise UsageError(
             f"{options.out} exists: give --update to add the logs to it, or another name, or remove it to begin anew"
         )
+    if options.update and not Path(options.out).exists():
+        raise UsageError(
+            f"there is no {options.out} to add to: leave --update out to begin it, or name one that exists"
+        )
     from armload.identification import check_usable
     from armload.identification.notes import of_readers
     from armload.posterior import check_new, learn_profile, load_profile, save_profile, with_known_weight
@@ -123,6 +127,7 @@ def run(options: argparse.Namespace) -> None:
     save_profile(profile, options.out)
     for note in of_readers(*logs):
         print_note(note)
+    profile = in_time(profile)
     if options.json:
         print_json(fields_of(profile) | {"out": options.out})
         return
@@ -157,7 +162,7 @@ def _show(options: argparse.Namespace) -> None:
     refuse_idle(given(options, *of_logs, parser=parser()), "of learning, not of armload profile show")
     if options.robot is None:
         refuse_idle(given(options, "frame", "gravity"), "of --robot, which is not given")
-    profile = load_profile(options.logs[1])
+    profile = in_time(load_profile(options.logs[1]))
     arm = None
     if options.robot is not None:
         options.gravity = profile.gravity if options.gravity is None else options.gravity

@@ -27,6 +27,16 @@ def of_motors(profile: Profile) -> bool:
     return profile.arm_name in ARMS and ARMS[profile.arm_name].torque_side == "motor"
 
 
+def in_time(profile: Profile) -> Profile:
+    """The same with its sessions in the order of their dates, for people; one without a date stays in its place."""
+    from dataclasses import replace
+
+    dated = [session for session in profile.sessions if session.date is not None]
+    dated.sort(key=lambda session: session.date or 0.0)
+    rest = iter(dated)
+    return replace(profile, sessions=tuple(one if one.date is None else next(rest) for one in profile.sessions))
+
+
 def fields_of(profile: Profile) -> dict[str, Any]:
     """The profile as one JSON object."""
     from dataclasses import asdict
@@ -127,7 +137,10 @@ def next_steps(profile: Profile) -> tuple[str, ...]:
     if len(profile.sessions) < 4:
         count = len(profile.sessions)
         few = "one session does not tell" if count == 1 else f"{count} sessions do not tell"
-        advice.append(f"{few} how the arm drifts: record it on four days or more")
+        advice.append(
+            f"{few} how the arm drifts, nor how far a log can be trusted: record it on four days or more, and learn a "
+            "new profile of all these logs, as --update keeps what was chosen for the first"
+        )
     moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
     still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
     if still:

@@ -43,12 +43,14 @@ def profile_figure(profile: Profile, arm: Arm) -> Figure:
             (side, reach, places[:, 2], ("distance from the base's axis [m]", "height [m]")),
             (top, places[:, 0], places[:, 1], ("x [m]", "y [m]")),
         ):
-            ax.scatter(x[:_RANDOM], y[:_RANDOM], c=share[:_RANDOM], s=7, vmin=0, vmax=1, cmap="viridis", linewidths=0)
-            seen = {"s": 16, "edgecolors": "black", "linewidths": 0.3}
-            dots = ax.scatter(x[_RANDOM:], y[_RANDOM:], c=share[_RANDOM:], vmin=0, vmax=1, cmap="viridis", **seen)
+            scale = {"vmin": 0, "vmax": 1, "cmap": "viridis"}
+            small, large = {"s": 7, "linewidths": 0}, {"s": 16, "edgecolors": "black", "linewidths": 0.3}
+            ax.scatter(x[:_RANDOM], y[:_RANDOM], c=share[:_RANDOM], label="any pose", **small, **scale)
+            dots = ax.scatter(x[_RANDOM:], y[_RANDOM:], c=share[_RANDOM:], label="of the logs", **large, **scale)
             ax.set_xlabel(names[0])
             ax.set_ylabel(names[1])
             ax.set_aspect("equal", adjustable="datalim")
+        side.legend(loc="upper right")
         above.colorbar(dots, ax=[side, top], label="unknown share of the smooth torque")
         ax = below.subplots()
         k = np.arange(len(profile.sessions)) + 1
