@@ -558,6 +558,43 @@ def test_what_stands_beside_the_hybrid_s_tables_is_in_them():
     assert f"Of {sum(case['logs'] for case in sound.values())} sound logs seven are called approximate" in page
 
 
+def test_rows_of_wrong_logs_below_the_target_are_named_with_what_other_logs_say_of_them():
+    page, again = words_of("hybrid_measured"), result_of("wrong_logs_again")["cases"]
+    rows = result_of("wrong_logs_panda")["cases"]
+    bare = {k: v["covered or said"] for k, v in rows.items() if "gain" not in k or k.endswith("known weight")}
+    assert {(k, n) for k, shares in bare.items() for n, share in enumerate(shares) if share < 0.945} == {
+        ("nothing, no tare", 1),
+        ("nothing, arms beyond", 1),
+        ("taken up or put down", 1),
+        ("the same, something light", 1),
+        ("torque gain ±1–3 %, known weight", 1),
+    }
+    said = (
+        "**First moments without a tare** ({:.0f} %). It is so: of the other logs {:.0f} % are covered, too ({} of {}; "
+    )
+    said += "{:.0f} to {:.0f} % if each log counts as one answer), and {:.0f} % of the masses."
+    other = again["nothing, no tare"]["all"]
+    moments, mass = other["first moments"], other["mass"]["share"]
+    seen, of = moments["covered or said"]
+    low, high = moments["by log"]
+    share = moments["share"]
+    assert (
+        said.format(100 * bare["nothing, no tare"][1], 100 * share, seen, of, 100 * low, 100 * high, 100 * mass) in page
+    )
+    pair = "nothing, arms beyond", "torque gain ±1–3 %, known weight"
+    was = [100 * bare[name][1] for name in pair]
+    assert (
+        "measured ones** ({:.0f} %), **and with a known weight if gains differ by joint** ({:.0f} %)".format(*was)
+        in page
+    )
+    counts = [again[name]["all"]["first moments"]["covered or said"] for name in pair]
+    shares = "logs {:.0f} and {:.0f} % are covered ({} and {} of 384)"
+    assert shares.format(*(100 * a / b for a, b in counts), *(a for a, _ in counts)) in page
+    changed = [again[name]["all"]["first moments"] for name in ("taken up or put down", "the same, something light")]
+    assert {tuple(case["covered or said"]) for case in changed} == {(372, 384)}
+    assert "are covered (372 of 384 in both rows;" in page
+
+
 def test_hours_of_a_cell_s_work_are_those_of_the_committed_measurement():
     """The sentences of README and page say that nothing was missed, late or false: so it has to be."""
     parts = json.loads((RESULTS / "cell_hours.json").read_text())["parts"].values()
