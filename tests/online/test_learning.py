@@ -130,6 +130,19 @@ def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profil
     assert any("not as its profile says" in note for note in last.notes)
 
 
+@pytest.mark.full  # some seconds
+def test_an_arm_that_is_found_to_be_another_amid_changes_is_not_its_profile_s(panda, world, profile, monkeypatch):
+    changed = []
+    monkeypatch.setattr(checked_solver, "FROM", 2.0)
+    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(0.0, 9.0, 1.0, -9.0, bool(changed)))
+    held = [(0.0, None), (6.0, draw_payload("boxes", 3, 1.5))]
+    last, _ = streamed(
+        panda, world, profile, held, lambda stream: changed.extend([1] * (stream.relative_to == "before"))
+    )
+    assert changed  # what is held was compared with the run before it, not with what the profile held
+    assert [note for note in last.notes if note.startswith("the arm is not as its profile says")]
+
+
 @pytest.mark.parametrize("found", [True, False])
 @pytest.mark.full  # some seconds
 def test_an_end_says_once_that_the_arm_is_not_its_profile_s(panda, world, profile, monkeypatch, found):

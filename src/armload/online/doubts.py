@@ -33,7 +33,10 @@ class Doubts:
         self.asked_whose = False
         self._drift: Drift | None = None
         self._tilt: Tilt | None = None
-        self._torque, self._than = "link", ""  # when gravity was asked; what the arm is not as, as of `relative_to`
+        self._torque, self._than = (
+            "link",
+            "",
+        )  # when gravity was asked; what the arm is not as, as of `notes.arm_changed`
         self._looked: tuple[int, int, bool, str] | None = None
         self.arm_changed: str | None = None
         self.sentences: tuple[str, ...] = ()
@@ -53,7 +56,8 @@ class Doubts:
         if stream.tilt is not None or torque != self._torque:  # what gears lose had looked like a base that leans
             self._tilt, self._torque = stream.tilt, torque
         if self.arm_changed is None:
-            self._than = relative_to
+            by_profile = "both" if relative_to == "tare" else "profile"
+            self._than = relative_to if run.profile is None else by_profile
         self.arm_changed = arm_changed(self._drift, self.another, self._than)
         restless = stream.restlessness if stream.seconds >= PERIOD else 0.0
         doubts = doubt_of(False, True, self.arm_changed, restless), leaning(self._arm, self._tilt, torque)
