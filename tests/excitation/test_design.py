@@ -132,6 +132,15 @@ def test_a_design_tells_more_than_random_motions_about_the_same_pose(panda, desi
         assert value > -np.linalg.slogdet(other.covariance[-1])[1] + 3.0
 
 
+def test_a_clearance_a_millimetre_short_does_not_cost_most_of_the_motion():
+    """Smaller motions of this one are not farther from what it nearly touches: drawn together it kept a fifth."""
+    limits = Constraints(arm("ur5e"), np.array([0.0, -1.2, 1.5, -1.5, -1.57, 0.0]))
+    motion = design_motion(limits, Criterion(limits.arm, "same"), 3.0).motion
+    assert problems(limits, motion) == []
+    accelerations = np.diff(motion.position(motion.instants(1000.0)), 2, axis=0) * 1e6
+    assert np.abs(accelerations / limits.most["acceleration"]).max() > 0.8
+
+
 def test_the_arms_own_check_agrees_with_a_design(panda, designed):
     assert check_motion(panda, designed.motion, PayloadRange(1.5).payload(1.0, np.zeros(3))).ok
 

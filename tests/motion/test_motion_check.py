@@ -5,9 +5,10 @@ import pinocchio as pin
 import pytest
 
 from armload.arms import arm
+from armload.devices.ros2.trajectory import TrajectoryMotion
 from armload.errors import MotionError
 from armload.inertia import InertialParameters
-from armload.motion import FourierMotion, check_motion, random_motion, rated_load, taie2024
+from armload.motion import FourierMotion, PathMotion, check_motion, random_motion, rated_load, taie2024
 from armload.motion.collision import capsule_arm
 
 
@@ -153,6 +154,29 @@ def test_each_passed_limit_is_named_with_joint_and_time(panda, joint, amplitude,
     (sentence,) = [p for p in check.problems if p.startswith(says)]
     assert " at t = " in sentence
     assert sentence in str(check)
+
+
+@pytest.mark.parametrize("kind", [PathMotion, TrajectoryMotion])
+@pytest.mark.parametrize("rate", [1000.0, 37.0])
+def test_what_a_table_does_between_its_points_counts(panda, kind, rate):
+    """A quintic from rest to rest over d in h goes at 15/8·d/h half way, whatever stands in its points."""
+    t = np.linspace(0.0, 1.0, round(rate) + 1)
+    q = np.tile(np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8]), (len(t), 1))
+    q[:, 0] += 1.5 * t
+    stopped = kind(t, q, np.zeros_like(q), np.zeros_like(q))
+    result = check_motion(panda, stopped)
+    assert result.peak["velocity"][0] == pytest.approx(15 / 8 * 1.5)
+    assert any("panda_joint1 passes its velocity limit" in problem for problem in result.problems)
+
+
+@pytest.mark.parametrize("rate", [200.0, 1000.0])
+def test_one_damaged_point_of_a_table_is_found_at_any_rate(panda, rate):
+    table = PathMotion.of(taie2024(), 1000.0)
+    q = table.positions.copy()
+    q[498, 0] += 0.3
+    damaged = PathMotion(table.times, q, table.velocities, table.accelerations)
+    assert check_motion(panda, table, rate=rate).ok
+    assert any("panda_joint1 passes" in problem for problem in check_motion(panda, damaged, rate=rate).problems)
 
 
 def test_the_torque_margin_is_that_of_the_arm_with_its_payload(panda):

@@ -36,6 +36,14 @@ def test_the_csv_holds_the_motion_at_every_sample(tmp_path):
     np.testing.assert_allclose(table[:, 1:], np.hstack(taie2024()(table[:, 0])), atol=1e-8)
 
 
+def test_a_table_that_begins_with_a_byte_order_mark_is_the_same_table(tmp_path):
+    plain, marked = tmp_path / "plain.csv", tmp_path / "marked.csv"
+    export_motion(taie2024(), plain, "csv", rate=50)
+    marked.write_bytes(b"\xef\xbb\xbf" + plain.read_bytes())
+    assert PathMotion.is_table(marked)
+    np.testing.assert_array_equal(PathMotion.read(marked).positions, PathMotion.read(plain).positions)
+
+
 def test_the_ros2_trajectory_has_the_fields_of_the_message_and_the_arms_joints(tmp_path, panda):
     path = tmp_path / "m.yaml"
     export_motion(taie2024(), path, "ros2", joint_names=panda.joint_names)

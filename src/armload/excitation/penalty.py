@@ -35,15 +35,21 @@ class PenaltyValue(NamedTuple):
 
 
 class Penalty:
-    """P of motions under given constraints."""
+    """P of motions under given constraints.
 
-    def __init__(self, constraints: Constraints) -> None:
+    Args:
+        constraints: what they keep to.
+        spare: clearance beyond what is kept, at most half of what the start has beyond it [m].
+    """
+
+    def __init__(self, constraints: Constraints, spare: float = 0.0) -> None:
         self.constraints = constraints
         arm = constraints.arm
         self._links = arm.link_parameters.ravel()
         most = {name: _TIGHT * value for name, value in constraints.most.items()}
         self._most = {k: np.where(np.isfinite(v), v, 1e12) for k, v in most.items()}
-        self._kept = constraints.around.kept(constraints.start)
+        kept, has = constraints.around.kept(constraints.start), constraints.around.clearance(constraints.start[None])[0]
+        self._kept = kept + np.minimum(spare, 0.5 * np.where(np.isfinite(has), has - kept, np.inf))
         room = 0.5 * (1.0 - _TIGHT) * (constraints.high - constraints.low)
         self._low, self._high = constraints.low + room, constraints.high - room
 

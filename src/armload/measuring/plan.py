@@ -105,9 +105,9 @@ class Plan:
         where, to, fast = (heading(what, slides, name) for what, name in _SHOWN)
         wide, wider = (max(least, len(head) + 2) for least, head in ((12, where), (17, fast)))
         lines.append(f"{'joint':<{width}}{where:>{wide}}{to:>{wide}}{fast:>{wider}}{'of its limit':>14}")
-        every = [leg.motion(leg.motion.instants(200.0)) for leg in self.legs]
-        q, dq = (np.concatenate([each[k] for each in every]) for k in (0, 1))
-        fastest, limit = np.abs(dq).max(axis=0), self.arm.limits.velocity
+        q = np.concatenate([leg.motion.position(leg.motion.instants(200.0)) for leg in self.legs])
+        fastest = np.max([leg.check.peak["velocity"] for leg in self.legs], axis=0)
+        limit = self.arm.limits.velocity
         for j, joint in enumerate(joints):
             share = f"{100 * fastest[j] / limit[j]:.0f} %" if np.isfinite(limit[j]) else "no limit"
             low, high = q[:, j].min(), q[:, j].max()

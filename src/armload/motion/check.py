@@ -86,7 +86,7 @@ def check_motion(
     rate: float = 200.0,
     collision_rate: float = 50.0,
 ) -> MotionCheck:
-    """Check a motion against the arm's limits, the floor and the arm itself, at evenly spaced instants.
+    """Check a motion against the arm's limits, the floor and the arm itself, at the instants of `Motion.looked_at`.
 
     >>> from armload.arms import arm
     >>> from armload.motion import taie2024
@@ -103,7 +103,7 @@ def check_motion(
         MotionError: the motion has another number of joints than the arm.
     """
     check_joints(motion, arm)
-    t = motion.instants(rate)
+    t = motion.looked_at(rate)
     q, dq, ddq = motion(t)
     jerk = motion.jerk(t)
     loaded = arm if payload is None else arm.with_payload(payload)

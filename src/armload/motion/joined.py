@@ -53,6 +53,11 @@ class JoinedMotion(Motion):
         """Of all [s]."""
         return sum(part.duration for part in self.parts)
 
+    def seams(self) -> NDArray[np.float64]:
+        """Of all parts [s]."""
+        begins = np.cumsum([0.0, *(part.duration for part in self.parts[:-1])])
+        return np.unique(np.concatenate([at + part.seams() for at, part in zip(begins, self.parts, strict=True)]))
+
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of the given order (0 to 3) at times t (N,); (N, n)."""
         ends = np.cumsum([part.duration for part in self.parts])

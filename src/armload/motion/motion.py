@@ -7,6 +7,9 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+# of a piece, where a check looks: half way a quintic from rest to rest is fastest, near a fifth it accelerates most
+_WITHIN = np.array([0.0, 0.2, 0.5, 0.8])
+
 
 class Motion(ABC):
     """A joint motion q(t) of an arm with n joints, at rest before t = 0 and after t = duration.
@@ -47,6 +50,19 @@ class Motion(ABC):
         [0.0, 2.0, 4.0, 6.0]
         """
         return np.linspace(0.0, self.duration, max(2, round(self.duration * rate) + 1))
+
+    def looked_at(self, rate: float) -> NDArray[np.float64]:
+        """Times (N,) [s], rising, at which a check looks: `instants`, and the seams and within each piece.
+
+        Between two points of a table an arm may be faster than at either.
+        """
+        seams = self.seams()
+        pieces = seams[:-1, None] + np.diff(seams)[:, None] * _WITHIN
+        return np.unique(np.concatenate([self.instants(rate), pieces.ravel()]))
+
+    def seams(self) -> NDArray[np.float64]:
+        """Times (K,) [s], rising, of the points between which the motion is made of pieces; none, if it is not."""
+        return np.empty(0)
 
     def position(self, t: ArrayLike) -> NDArray[np.float64]:
         """q at times t (N,) [s]; (N, n) [rad]."""

@@ -89,7 +89,7 @@ class PathMotion(Motion):
             MotionError: the file is missing or is not such a table.
         """
         try:
-            with open(path, newline="", encoding="utf-8") as file:
+            with open(path, newline="", encoding="utf-8-sig") as file:
                 header, *rows = list(csv.reader(file))
             table = np.array(rows, dtype=float)
         except OSError as error:
@@ -108,10 +108,14 @@ class PathMotion(Motion):
     def is_table(path: str | Path) -> bool:
         """Whether a file begins as such a table does: it has accelerations, and no torque as a log has."""
         try:
-            with open(path, newline="", encoding="utf-8") as file:
+            with open(path, newline="", encoding="utf-8-sig") as file:
                 return _is_header(next(csv.reader(file), []))
         except (OSError, ValueError, csv.Error):
             return False
+
+    def seams(self) -> NDArray[np.float64]:
+        """The points' times [s]."""
+        return self.times
 
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of any order ≥ 0 at times t (N,) within 0 … the last; (N, n)."""

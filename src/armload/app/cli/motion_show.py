@@ -56,7 +56,7 @@ def run_show(options: argparse.Namespace) -> int:
     known = named or options.page or options.figure is not None or not Path(options.motion).exists()
     slides = arm.limits.slides if known else np.zeros(motion.n, bool)
     units = slides if known else [False, True]  # of a file's joints nobody said which of them slide
-    q, dq, ddq = motion(np.linspace(0.0, motion.duration, 1001))
+    q, dq, ddq = motion(motion.looked_at(1000.0 / motion.duration))
     rows = table(
         f"{motion.name}: {motion.n} joints, {motion.duration:g} s",
         "joint",

@@ -85,6 +85,10 @@ class TrajectoryMotion(Motion):
         """Time of the last point [s]."""
         return float(np.asarray(self.times)[-1])
 
+    def seams(self) -> NDArray[np.float64]:
+        """The points' times [s]."""
+        return np.asarray(self.times)
+
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
         """The derivative of q of the given order (0 to 3) at times t (N,); (N, n)."""
         return np.asarray(self._curve(np.asarray(t, dtype=float), nu=order))
