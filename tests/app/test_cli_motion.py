@@ -64,7 +64,8 @@ def test_the_table_of_a_motion_is_that_motion_to_every_command(designed, tmp_pat
         assert main(["motion", "show", motion, "--robot", "panda"]) == 0
         assert main(["motion", "export", motion, "--format", "ros2"]) == 0
     assert [one["kind"] for one in found] == ["motion", "motion"]
-    np.testing.assert_allclose(found[1]["peak"]["velocity"], found[0]["peak"]["velocity"], atol=1e-6)
+    fastest = [one["peak"]["velocity"] for one in found]  # of the table at each of its rows, of the motion at 200 Hz
+    np.testing.assert_allclose(fastest[1], fastest[0], rtol=2e-3)
     np.testing.assert_allclose(
         found[1]["without_tare"]["half_width"], found[0]["without_tare"]["half_width"], rtol=1e-3
     )
