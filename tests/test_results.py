@@ -490,8 +490,8 @@ def test_the_short_summaries_of_the_hybrid_are_those_of_the_committed_tables():
     )
     approximate = sum(round(case["logs"] * (1.0 - case["calibrated"])) for case in healthy)
     assert f"of a Panda's wrong logs {100 * least:.0f} to 100 % are covered or said" in page
-    words = {2: "two"}
-    assert f"Of {sum(case['logs'] for case in healthy)} sound logs {words[approximate]} are called approximate" in page
+    words = {1: "one is", 2: "two are"}
+    assert f"Of {sum(case['logs'] for case in healthy)} sound logs {words[approximate]} called approximate" in page
 
 
 def test_what_stands_beside_the_hybrid_s_tables_is_in_them():
