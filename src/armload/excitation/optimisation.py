@@ -6,8 +6,8 @@ c are the control points of quintic splines (`motion.spline`), at rest at both e
 of `criterion.py`, the constraints those of `constraints.py`. They enter as a quadratic penalty whose weight rises from
 stage to stage; L-BFGS follows the exact gradient from several seeded starts, the best of which goes on. What is found
 is checked at 1 kHz by other code (`verification.py`) and drawn together about the start pose until it passes: the pose
-itself keeps to every constraint, so that such a motion exists. One that this would make much smaller, because a smaller
-motion is no nearer to what is kept, is first climbed on with a heavier penalty and more clearance.
+itself keeps to every constraint, so that such a motion exists. One that this would make much smaller, as a smaller
+motion need not be farther from what it nearly touches, is designed on first, with a heavier penalty and more clearance.
 
 Sources: Swevers et al., T-RO 1997 (D-optimal excitation); Liu & Nocedal 1989 (L-BFGS); Nocedal & Wright, Numerical
 Optimization, ch. 17 (quadratic penalties).
@@ -41,9 +41,9 @@ _RATE = 50.0  # [Hz] of the samples while designing: the bound differs by less t
 STARTS = 4  # seeded
 # iterations of L-BFGS and weight of the penalty: of each start, then of the best one
 STAGES = ((12, 30.0), (30, 200.0), (40, 2000.0))
-# how much smaller a motion may become by being drawn together: less is left to the designs that need it, as it costs a
-# fifth of a design more; iterations and weight of the penalty then, and clearance beyond what is kept [m], which such a
-# penalty is not worth a millimetre of. Of 20 requests at random 3 were drawn together to 0.02 to 0.68, and then to 1
+# what must be left of a motion's size once it is drawn together: else the design goes on, a fifth longer, with so many
+# iterations, a penalty of such a weight, and a clearance [m] beyond what is kept, as a penalty leaves a millimetre to
+# it. Of 20 requests at random three were drawn together to 0.02, 0.29 and 0.68 of their size, and none afterwards
 _MUCH_SMALLER = 0.9
 _AGAIN, _SPARE = (20, 20_000.0), 0.002
 _SHRINKS, _SHRINK = 60, 0.97  # how often, and by what at least, a motion is drawn together
