@@ -9,8 +9,8 @@ import pytest
 import armload
 from armload import HybridIdentifier, OnlineIdentifier, arm, write_recording
 from armload.identification import identify
+from armload.identification.arm_notes import arm_changed, gravity_turned
 from armload.identification.intervals import intervals
-from armload.identification.notes import arm_changed, gravity_turned
 from armload.identification.reporting import removal
 from armload.identification.thresholds import FARTHEST
 from armload.inertia import NAMES, Z95, InertialParameters, com_interval, inertia_com_std, phi_to_com, vech

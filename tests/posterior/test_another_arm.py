@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 from armload import arm, identify
 from armload.arms import rated_effort
-from armload.identification.notes import arm_changed
+from armload.identification.arm_notes import arm_changed
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.motion import random_motion
 from armload.posterior import HybridIdentifier

@@ -12,7 +12,7 @@ from armload import arm
 from armload.arms import Arm
 from armload.arms.momentum_row import MomentumRow, leaning_row
 from armload.identification import identify
-from armload.identification.notes import gravity_doubted
+from armload.identification.arm_notes import gravity_doubted
 from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from armload.devices.franka.form import FrankaLoad, franka_load
     from armload.devices.franka.source import FrankaSource
     from armload.devices.guard import check_writable, flange_of, is_moving
-    from armload.devices.load import Load, about, read_load
+    from armload.devices.load import Load, about
+    from armload.devices.load_file import read_load
     from armload.devices.mover import Mover, StreamedMover, samples_of_movement
     from armload.devices.opening import open_source
     from armload.devices.opening_controllers import WITH_CONTROLLER, controller_of

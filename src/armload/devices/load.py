@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.devices import load_remarks as remarks_on
 from armload.errors import SinkError
-from armload.inertia import NAMES, Z95, InertialParameters, held, inertia_com_std, is_consistent, to_order
-from armload.payloads.payload_file import payload_from, read_content
+from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -164,7 +161,7 @@ class Load:
             )
         if self.consistent:
             return self
-        return self._with(InertialParameters(self._nearest(), self.frame))
+        return self.with_parameters(InertialParameters(self._nearest(), self.frame))
 
     def without_inertia(self) -> Load:
         """The same for who does not ask for an inertia: nothing is said of that."""
@@ -207,9 +204,9 @@ class Load:
             moment_widths=_beside(self.moment_widths, part.moment_widths),
             remarks=remarks_on.beside(self.remarks, part.remarks),
         )
-        return replace(both._with(parameters), relative_to=relative_to if self.relative_to else None)
+        return replace(both.with_parameters(parameters), relative_to=relative_to if self.relative_to else None)
 
-    def _with(self, parameters: InertialParameters) -> Load:
+    def with_parameters(self, parameters: InertialParameters) -> Load:
         """Other parameters, as uncertain as before: of smaller moments that may be more than they are."""
         remarks = self.remarks
         if self.moment_widths is not None and parameters.mass > 0:
@@ -259,61 +256,3 @@ def counted_numbers(parameters: InertialParameters, order: str) -> list[float]:
     if parameters.phi.any():
         return numbers_of(parameters, order)
     return [0.0] * len(to_order(InertialParameters(np.eye(10)[0]), order))
-
-
-def read_load(path: str | Path) -> Load:
-    """The load in a file: what `armload identify --json` printed, or a payload file, known as well as it says.
-
-    Raises:
-        PayloadError: the file is missing or malformed, or no body can have its parameters.
-        SinkError: the fields of an identification in it are malformed.
-    """
-    content = read_content(path)
-    payload = payload_from(content, path)
-    parameters, robot, relative_to = (
-        payload.parameters,
-        _text(content, "robot", path),
-        _text(content, "relative_to", path),
-    )
-    determined = _flags(content, "determined", path)
-    if determined is None:
-        load = Load(parameters, robot=robot, relative_to=relative_to, remarks=remarks_on.assumed(payload))
-        if not payload.covariance.any():
-            return load
-        widths = 2 * Z95 * inertia_com_std(parameters.phi, payload.covariance)[[0, 3, 5]]
-        return replace(load, std=np.sqrt(np.diag(payload.covariance)), moment_widths=widths)._with(parameters)
-    std = None
-    try:
-        low, high = (np.array(content[key], dtype=float) for key in ("phi_low", "phi_high"))
-        if low.shape == high.shape == (10,) and np.all(np.isfinite(high - low)) and np.all(high >= low):
-            std = (high - low) / (2 * Z95)
-    except (KeyError, TypeError, ValueError, OverflowError):
-        pass  # written by hand: the numbers themselves are enough
-    resting = _flags(content, "rests_on_prior", path) or (False,) * 10
-    remarks = remarks_on.doubted(content.get("interval")) + remarks_on.of_a_part(content.get("segments"))
-    remarks += remarks_on.leaning(determined, resting) + remarks_on.assumed(payload)
-    widths = None
-    try:
-        inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
-        value, low, high = (np.diag(np.array(x, dtype=float)) for x in inertia)
-        remarks += remarks_on.loose(value, high - low, determined)
-        widths = high - low if np.shape(high - low) == (3,) else None
-    except (KeyError, TypeError, ValueError, OverflowError):
-        pass
-    return Load(parameters, determined, robot, relative_to, std, remarks, widths)
-
-
-def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:
-    value = content.get(key)
-    if value is None:
-        return None
-    if not isinstance(value, list) or len(value) != 10 or any(not isinstance(x, bool) for x in value):
-        raise SinkError(f"{path}: {key} is {json.dumps(value)[:80]}, expected 10 times true or false")
-    return tuple(value)
-
-
-def _text(content: dict[str, Any], key: str, path: str | Path) -> str | None:
-    value = content.get(key)
-    if value is not None and not isinstance(value, str):
-        raise SinkError(f"{path}: {key} is {json.dumps(value)[:80]}, expected text")
-    return value

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.estimators import ArmMismatch, Estimate
 from armload.identification.arm_health import ArmHealth
+from armload.identification.arm_notes import held_against
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
@@ -153,12 +154,11 @@ def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Aske
 def _found_on_side(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
     """The same, whichever side of the gears the torque is measured on."""
     found = _found(choose(arm, tare, asked.method, profile=asked.profile), arm, recording, asked)
-    known = "tare" if asked.profile is None else "profile" if tare is None else "both"
     if found.unknown_friction:
         motor_side = replace(arm, motor_torque=True)
         found = _found(choose(motor_side, tare, asked.method, profile=asked.profile), motor_side, recording, asked)
         found = found._replace(friction_found=True)
-    return found._replace(arm_known=known)
+    return found._replace(arm_known=held_against(asked.profile is not None, tare is not None))
 
 
 def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Found:

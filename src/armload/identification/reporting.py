@@ -10,22 +10,11 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.answer import Identification, body_of, is_removal
+from armload.identification.arm_notes import another_model, arm_changed, driven_by_friction, gravity_turned, leaning
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
-from armload.identification.notes import (
-    COMPUTED,
-    another_model,
-    arm_changed,
-    driven_by_friction,
-    gravity_turned,
-    lacking,
-    leaning,
-    leaning_on_prior,
-    less_than_nothing,
-    not_rigid,
-    without_mass,
-)
+from armload.identification.notes import COMPUTED, lacking, leaning_on_prior, less_than_nothing, not_rigid, without_mass
 from armload.inertia import HELD, Z95, InertialParameters, held, is_consistent, vech
 from armload.inertia import determined as determined_by
 from armload.posterior.restless import RESTLESS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armload.arms import Arm
-from armload.identification.notes import arm_changed, leaning
+from armload.identification.arm_notes import arm_changed, held_against, leaning
 from armload.identification.reporting import doubt_of
 from armload.posterior import PosteriorLeastSquares
 from armload.posterior.restless import PERIOD
@@ -33,10 +33,8 @@ class Doubts:
         self.asked_whose = False
         self._drift: Drift | None = None
         self._tilt: Tilt | None = None
-        self._torque, self._than = (
-            "link",
-            "",
-        )  # when gravity was asked; what the arm is not as, as of `notes.arm_changed`
+        self._torque = "link"  # when gravity was asked
+        self._than = "tare"  # what the arm is not as, as of `arm_changed`
         self._looked: tuple[int, int, bool, str] | None = None
         self.arm_changed: str | None = None
         self.sentences: tuple[str, ...] = ()
@@ -56,8 +54,7 @@ class Doubts:
         if stream.tilt is not None or torque != self._torque:  # what gears lose had looked like a base that leans
             self._tilt, self._torque = stream.tilt, torque
         if self.arm_changed is None:
-            by_profile = "both" if relative_to == "tare" else "profile"
-            self._than = relative_to if run.profile is None else by_profile
+            self._than = held_against(run.profile is not None, relative_to == "tare")
         self.arm_changed = arm_changed(self._drift, self.another, self._than)
         restless = stream.restlessness if stream.seconds >= PERIOD else 0.0
         doubts = doubt_of(False, True, self.arm_changed, restless), leaning(self._arm, self._tilt, torque)

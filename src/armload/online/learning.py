@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from armload.arms import rated_effort
 from armload.errors import IdentificationError
-from armload.identification.notes import arm_changed
+from armload.identification.arm_notes import arm_changed
 from armload.inertia import HELD
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import PosteriorLeastSquares, Profile
