@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -180,6 +181,19 @@ def test_an_answer_is_at_most_ten_milliseconds_old(panda, log):
         live.update(sample)
         ages.append(sample.t - live.data_t)
     assert max(ages[3:]) <= 0.0101
+
+
+@pytest.mark.parametrize("after", [200, 260])  # samples: while a solution is being found, and between two
+def test_a_copy_of_a_running_identifier_goes_on_as_the_original_does(panda, log, after):
+    samples = list(log)
+    identifier = HybridIdentifier(panda)
+    for sample in samples[:after]:
+        identifier.update(sample)
+    other = deepcopy(identifier)
+    both = [[one.update(sample) for sample in samples[after:450]] for one in (identifier, other)]
+    for one, two in zip(*both, strict=True):
+        np.testing.assert_array_equal(one.phi, two.phi)
+        np.testing.assert_array_equal(one.covariance, two.covariance)
 
 
 def test_an_empty_run_may_be_the_tare_of_the_next(panda, log, tare):
