@@ -4,6 +4,7 @@ import json
 import os
 import re
 import time
+from copy import deepcopy
 from dataclasses import fields, replace
 from functools import cache
 
@@ -419,6 +420,20 @@ def test_a_saved_state_keeps_its_tare(panda, log, tmp_path):
         each.close()
     assert there.relative_to == "tare"
     assert np.array_equal(here.phi, there.phi)
+
+
+@pytest.mark.parametrize("cut", [605, 626])  # samples: a solution is being found; the run after a change is made
+def test_a_copy_of_a_stream_goes_on_exactly(panda, online, log, cut):
+    empty = simulate(panda, taie2024(), world=World.real_like(panda, seed=3), rate=200.0, seed=1)
+    samples = [*list(empty)[:600], *list(log)[600:700]]
+    fed(online, samples[:cut])
+    copied = deepcopy(online)
+    here, there = ([fed(each, [sample]) for sample in samples[cut:]] for each in (online, copied))
+    copied.close()
+    assert here[-1].event is not None
+    for one, two in zip(here, there, strict=True):
+        assert np.array_equal(one.phi, two.phi)
+        assert np.array_equal(one.covariance, two.covariance)
 
 
 def test_a_state_does_not_grow(panda, online, tmp_path):

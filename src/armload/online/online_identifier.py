@@ -133,6 +133,12 @@ class OnlineIdentifier:
         self._event_t, self._event_shift = -math.inf, 0.0  # of the event on the samples' clock, and to the stream's [s]
         self._judgement.reset()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For a copy: nothing in the background changes while it is made."""
+        if self._watch is not None:
+            self._watch.hold()
+        return vars(self)
+
     def __repr__(self) -> str:
         return f"<OnlineIdentifier {self.method} for {self.arm.name} about {self.arm.frame}>"
 
@@ -198,9 +204,7 @@ class OnlineIdentifier:
         Raises:
             IdentificationError: the method keeps something that cannot be written.
         """
-        if self._watch is not None:
-            self._watch.hold()
-        state = {k: v for k, v in vars(self).items() if k not in ("arm", "profile", "_every")}
+        state = {k: v for k, v in self.__getstate__().items() if k not in ("arm", "profile", "_every")}
         return save_state(path, state, self.arm, self.method, self._engine)
 
     @classmethod

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from copy import deepcopy
 from queue import SimpleQueue
-from typing import Any, Self
+from typing import Any
 
 from armload.posterior.same_motion import Difference
 from armload.posterior.solve import Solution
@@ -32,13 +31,6 @@ class Handover:
         self._worker = Worker()
         self.adopt_at = 0
         self._clear()
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Of a copied stream: a thread of its own; what is being done is waited for, and both have it."""
-        self.hold()
-        other = type(self)()
-        other.adopt_at, other._result = self.adopt_at, deepcopy(self._result, memo)
-        return other
 
     def _clear(self) -> None:
         self._future: Future[Result] | None = None

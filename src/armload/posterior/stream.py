@@ -8,6 +8,7 @@ thread; the posterior at the new scales, brought up to date, replaces the runnin
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +79,11 @@ class StreamingPosterior:
         self._accumulation = Accumulation(self._empty(), same_motion)
         self._pooling, self._looked = Pooling(together), Pooling(together)
         self.reset()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For a copy: the second thread changes nothing while it is made."""
+        self.hold()
+        return vars(self)
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""

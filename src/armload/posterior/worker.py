@@ -19,6 +19,10 @@ class Worker:
 
     _tasks: _Tasks | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For a copy: it has a thread of its own; whoever owns this one waits for what it does."""
+        return {}
+
     def submit(self, task: Callable, *arguments: Any) -> Future:
         """Begin `task(*arguments)` after what was begun before."""
         if self._tasks is None:
