@@ -13,7 +13,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armload.arms import ARMS, Arm, arm, full_arm_regressor, momentum_regressor, payload_regressor, rated_effort
+from armload.arms import (
+    ARMS,
+    Arm,
+    arm,
+    full_arm_regressor,
+    momentum_regressor,
+    payload_regressor,
+    rated_effort,
+    rated_mass,
+)
+from armload.arms.strength import poses
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.payloads import franka_hand, hand_on
@@ -730,6 +740,30 @@ def test_the_strength_of_joints_without_limits_is_about_that_of_the_ratings():
     ratio = rated_effort(limitless) / known.limits.effort
     assert np.all((ratio > 0.3) & (ratio < 2.0))
     np.testing.assert_array_equal(rated_effort(known), known.limits.effort)
+
+
+def test_an_arm_whose_limits_do_not_hold_its_own_weight_is_rated_as_one_without_them():
+    # as of arms that springs bear (Baxter, PR2): its limits would leave room for nothing
+    def two_links(effort):
+        limit = f'<limit lower="-2" upper="2" effort="{effort}" velocity="3"/>'
+        return Arm(
+            "spring",
+            robot(
+                link("base"),
+                joint("lift", "revolute", "base", "upper", extra=limit),
+                link("upper", 6.0, com="0 0 0.2"),
+                joint("bend", "revolute", "upper", "fore", "0 0 0.4", extra=limit.replace(f'"{effort}"', '"30"')),
+                link("fore", 3.0, com="0 0 0.15"),
+                joint("end", "fixed", "fore", "tool", "0 0 0.3"),
+                link("tool"),
+            ),
+        )
+
+    weight = np.abs(two_links(60).torque(poses(two_links(60)))).max(axis=0)[0]
+    assert 20.0 < weight < 30.0
+    assert rated_mass(two_links(20)) == pytest.approx(rated_mass(two_links(2.0 * weight)))
+    assert 1.0 < rated_mass(two_links(20)) < 5.0
+    assert rated_mass(two_links(1.2 * weight)) < rated_mass(two_links(2.0 * weight))  # a limit that holds is believed
 
 
 def test_an_arm_loads_from_a_urdf_file(tmp_path, panda):
