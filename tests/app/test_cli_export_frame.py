@@ -131,6 +131,19 @@ def test_an_arm_whose_flange_has_another_name_is_refused_with_its_links(export):
     assert "these numbers are about mounting_plate" in err
 
 
+def test_a_description_that_ends_in_two_fingers_is_read_about_what_was_identified(export):
+    fingers = "".join(
+        f'<link name="{name}"/><joint name="{name}_joint" type="prismatic"><parent link="gripper_tcp"/>'
+        f'<child link="{name}"/><axis xyz="0 1 0"/><limit lower="0" upper="0.04" effort="20" velocity="1"/></joint>'
+        for name in ("left", "right")
+    )
+    urdf = with_gripper("ur10e", "gripper_tcp").replace("</robot>", fingers + "</robot>")
+    out, _ = export("tool0", urdf, "--to", "ur")
+    np.testing.assert_allclose(numbers(out)[1], _COM, atol=1e-12)
+    _, err = export(None, urdf, "--to", "ur", code=2)
+    assert "'left' and 'right' among them: name the link" in err
+
+
 def test_of_two_arms_in_a_file_the_flange_beside_the_payload_is_meant():
     text = description_of("ur5e").rstrip().removesuffix("</robot>")
     inside = text[text.index(">", text.index("<robot")) + 1 :]
@@ -140,7 +153,8 @@ def test_of_two_arms_in_a_file_the_flange_beside_the_payload_is_meant():
         f'<child link="{side}_{arm("ur5e").frames[0]}"/></joint>'
         for side, y in (("left", 0.5), ("right", -0.5))
     )
-    both = Arm("both", f'<robot name="both"><link name="table"/>{"".join(sides)}{joints}</robot>')
-    side = str(both.frame).split("_")[0]
-    assert flange_named(both, ARMS.values(), f"{side}_wrist_3_link") == f"{side}_tool0"
-    assert flange_named(both, ARMS.values()) is None
+    both = f'<robot name="both"><link name="table"/>{"".join(sides)}{joints}</robot>'
+    for side in ("left", "right"):
+        chosen = Arm("both", both, f"{side}_tool0")
+        assert flange_named(chosen, ARMS.values(), f"{side}_wrist_3_link") == f"{side}_tool0"
+        assert flange_named(chosen, ARMS.values()) is None

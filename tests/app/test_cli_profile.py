@@ -448,3 +448,16 @@ def test_a_profile_of_another_arm_is_refused_before_anything_moves(profile, caps
         assert said.out == ""
         assert "panda" in said.err.splitlines()[-1]
         assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_that_a_profile_is_used_with_names_frame_and_gravity_as_it_was_learned(folder, tmp_path, capsys):
+    from armload.arms.facts import description_of
+
+    urdf = tmp_path / "cell.urdf"
+    urdf.write_text(description_of("panda"))
+    about = ("--robot", str(urdf), "--frame", "panda_link7")
+    out = str(tmp_path / "cell.profile")
+    assert main(["profile", str(folder / "day0.csv"), *about, "--gravity", "0,0,-9.8", "--out", out]) == 0
+    (use,) = (line for line in capsys.readouterr().out.splitlines() if "use it with" in line)
+    assert f"{' '.join(about)} --gravity 0,0,-9.8 --profile {out}" in use
+    assert main(["profile", "show", out, "--robot", str(urdf)]) == 0  # about the profile's own frame

@@ -13,7 +13,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armload.arms import ARMS, Arm, arm, full_arm_regressor, momentum_regressor, payload_regressor, rated_effort
+from armload.arms import (
+    ARMS,
+    Arm,
+    arm,
+    full_arm_regressor,
+    momentum_regressor,
+    payload_regressor,
+    rated_effort,
+    rated_mass,
+)
+from armload.arms.strength import poses
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.payloads import franka_hand, hand_on
@@ -572,6 +582,36 @@ def test_the_default_frame_is_the_last_link():
     assert arm("ur5e").frame == arm("ur10e").frame == "tool0"
 
 
+def two_arms():
+    sides = []
+    for side in ("left", "right"):
+        upper, fore, tool = (f"{side}_{name}" for name in ("upper", "fore", "tool"))
+        sides += [link(upper, 3.0), link(fore, 2.0), link(tool)]
+        sides += [joint(f"{side}_pan", "revolute", "base", upper), joint(f"{side}_lift", "revolute", upper, fore)]
+        sides += [joint(f"{side}_end", "fixed", fore, tool)]
+    return robot(link("base"), *sides)
+
+
+@pytest.mark.parametrize(
+    ("urdf", "says"),
+    [
+        (two_arms(), r"'left_tool' and 'right_tool' among them: name the link .* with --frame"),
+        (URDF_GRIPPER, r"'left' and 'right' among them: name the link .* with --frame"),
+    ],
+)
+def test_of_several_ends_that_could_carry_the_payload_none_is_guessed(urdf, says):
+    with pytest.raises(ArmError, match=says):
+        Arm("x", urdf)
+    assert Arm("x", two_arms(), "left_tool").joint_names == ("left_pan", "left_lift")
+
+
+def test_a_joint_that_another_one_drives_is_no_joint_of_the_chain():
+    # its torque is its own in no log: the drive of the other joint bears it
+    driven = URDF_PENDULUM.replace('type="revolute">', 'type="revolute"><mimic joint="crank" multiplier="-1"/>')
+    with pytest.raises(ArmError, match="joint 'hinge' of x, which moves the frame 'tip', mimics 'crank'"):
+        Arm("x", driven)
+
+
 def test_any_frame_can_carry_the_payload():
     for frame in ("panda_link7", "panda_link4"):
         chosen = arm("panda", frame=frame)
@@ -702,6 +742,30 @@ def test_the_strength_of_joints_without_limits_is_about_that_of_the_ratings():
     np.testing.assert_array_equal(rated_effort(known), known.limits.effort)
 
 
+def test_an_arm_whose_limits_do_not_hold_its_own_weight_is_rated_as_one_without_them():
+    # as of arms that springs bear (Baxter, PR2): its limits would leave room for nothing
+    def two_links(effort):
+        limit = f'<limit lower="-2" upper="2" effort="{effort}" velocity="3"/>'
+        return Arm(
+            "spring",
+            robot(
+                link("base"),
+                joint("lift", "revolute", "base", "upper", extra=limit),
+                link("upper", 6.0, com="0 0 0.2"),
+                joint("bend", "revolute", "upper", "fore", "0 0 0.4", extra=limit.replace(f'"{effort}"', '"30"')),
+                link("fore", 3.0, com="0 0 0.15"),
+                joint("end", "fixed", "fore", "tool", "0 0 0.3"),
+                link("tool"),
+            ),
+        )
+
+    weight = np.abs(two_links(60).torque(poses(two_links(60)))).max(axis=0)[0]
+    assert 20.0 < weight < 30.0
+    assert rated_mass(two_links(20)) == pytest.approx(rated_mass(two_links(2.0 * weight)))
+    assert 1.0 < rated_mass(two_links(20)) < 5.0
+    assert rated_mass(two_links(1.2 * weight)) < rated_mass(two_links(2.0 * weight))  # a limit that holds is believed
+
+
 def test_an_arm_loads_from_a_urdf_file(tmp_path, panda):
     path = tmp_path / "mine.urdf"
     path.write_text(panda.urdf, encoding="utf-8")
@@ -781,6 +845,30 @@ def test_a_built_in_arm_that_is_written_otherwise_is_asked_about(name, meant):
         (
             lambda: Arm("x", ONE_LINK.replace('xyz="0 1 0"', 'xyz="0 0 0"')),
             "x: <axis> of joint 'j' has xyz = '0 0 0', expected a direction",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('value="1.0"', 'value=""')),
+            "x: <mass> of link 'a' has value = '', expected a number",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('value="1.0"', 'value="1_0"')),
+            "x: <mass> of link 'a' has value = '1_0', expected finite numbers",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('xyz="0 1 0"', 'xyz="0 1"')),
+            "x: <axis> of joint 'j' has xyz = '0 1', expected three numbers",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('lower="-2"', 'lower="3"')),
+            "x: <limit> of joint 'j' has lower = 3, upper = 2, .*expected lower below upper",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace('effort="9"', 'effort="-9"')),
+            "x: <limit> of joint 'j' has .*effort = -9 .*expected .*no negative limit",
+        ),
+        (
+            lambda: Arm("x", ONE_LINK.replace("</robot>", joint("k", "fixed", "base", "a") + "</robot>")),
+            "the link 'a' of x is carried by two joints, 'j' and 'k': expected a tree",
         ),
         (
             lambda: Arm("x", ONE_LINK.replace('type="revolute"', 'type="revolte"')),

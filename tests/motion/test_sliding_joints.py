@@ -7,13 +7,17 @@ import pytest
 
 from armload.app.cli import main
 from armload.app.cli.motion_check import passed
+from armload.app.cli.profile_text import next_steps
 from armload.arms import Arm, arm
-from armload.errors import MotionError
+from armload.errors import MotionError, RecordingError
 from armload.excitation import Constraints, PayloadRange, problems
 from armload.excitation.verification import used
+from armload.identification import check_plausible
 from armload.lab.report.motion_figure import motion_figure
 from armload.motion import PathMotion, check_motion, random_motion, save_motion
-from armload.recording import Recording
+from armload.posterior import learn_profile
+from armload.recording import ColumnSpec, Recording, read_recording
+from armload.recording.currents import in_si
 
 
 def link(name, mass):
@@ -164,3 +168,34 @@ def test_the_page_names_units_by_joint(lift):
     assert "[rad, m]" in table
     assert "up (slides)" in table
     assert json.dumps(table).count("(slides)") == 1
+
+
+def test_what_is_in_degrees_are_the_angles_and_not_the_joint_that_slides(lift, tmp_path):
+    t = np.linspace(0.0, 2.0, 201)
+    q = np.stack([0.3 + 0.2 * np.sin(t), 40.0 * np.sin(t)], axis=1)  # m and degrees
+    dq = np.stack([0.2 * np.cos(t), 40.0 * np.cos(t)], axis=1)
+    table = np.column_stack([t, q, dq, np.ones_like(q)])
+    path = tmp_path / "run.csv"
+    np.savetxt(path, table, delimiter=",", header="t,q1,q2,dq1,dq2,tau1,tau2", comments="")
+    log = read_recording(path, lift, columns="q_unit=deg,dq_unit=deg/s")
+    np.testing.assert_allclose(log.q, q * [1.0, np.pi / 180.0], rtol=1e-6)
+    np.testing.assert_allclose(log.dq, dq * [1.0, np.pi / 180.0], rtol=1e-6)
+    scale, _ = in_si(ColumnSpec.of("q_unit=deg,dq_unit=deg/s"), lift, 2, "here")  # of a bag, of a topic
+    np.testing.assert_allclose(scale, [1.0, np.pi / 180.0, 1.0, np.pi / 180.0, 1.0, 1.0])
+
+
+def test_a_log_beyond_the_range_of_a_joint_that_slides_is_refused_in_metres(lift):
+    t = np.linspace(0.0, 2.0, 201)
+    q = np.stack([0.7 + 0.2 * np.sin(t), 0.4 * np.sin(t)], axis=1)
+    log = Recording(t, q, np.gradient(q, t, axis=0), np.ones_like(q))
+    with pytest.raises(RecordingError, match=r"q1 = 0\.7000 m at .* limits of lift's up \(0\.0000 to 0\.6000 m\)"):
+        check_plausible(log, lift)
+
+
+def test_a_joint_that_slides_is_not_asked_to_move_by_half_a_radian(lift):
+    t = np.linspace(0.0, 10.0, 1001)
+    q = np.stack([0.3 + 0.2 * np.sin(t), 0.1 * np.sin(t)], axis=1)
+    dq, ddq = np.gradient(q, t, axis=0), np.stack([-0.2 * np.sin(t), -0.1 * np.sin(t)], axis=1)
+    tau = lift.torque(q, dq, ddq) + 0.5 * np.tanh(dq / 0.05)
+    said = [line for line in next_steps(learn_profile(lift, [Recording(t, q, dq, tau)]), lift) if "radian" in line]
+    assert said == ["joint 2 moved by less than half a radian in all logs: move it further"]

@@ -6,9 +6,12 @@ import pytest
 
 from armload.app.cli import main
 from armload.devices import Detached
+from armload.devices.reader import columns_of
 from armload.errors import SourceError
 from armload.service import ArmSettings, Service, ServiceSettings
+from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
+from armload.service.spare import Spare
 
 
 @pytest.fixture
@@ -21,6 +24,14 @@ def cell(tmp_path):
         return str(tmp_path / "cell.toml")
 
     return write
+
+
+def test_a_spare_process_makes_ready_for_the_arm_up_to_its_own_frame():
+    (kind,) = Spare([ArmSettings(name="left", source="sim", robot="panda", frame="panda_link4", method="map-gp")]).kinds
+    (reader,) = ready([kind])
+    assert reader.ring.columns == columns_of(4)
+    reader.end(5.0)
+    reader.release()
 
 
 @pytest.mark.parametrize("duration", ["0", "60"])

@@ -33,7 +33,8 @@ def test_what_a_saved_state_holds_is_unconfirmed_until_a_second_has_told(panda, 
     process, answers = Spare([]).take(), []
     assert process.stdout is not None
     try:
-        order(process, {"ready": [{"robot": "panda", "method": "map"}]})  # so that its first answer comes soon
+        # so that its first answer comes soon
+        order(process, {"ready": [{"robot": "panda", "frame": None, "method": "map"}]})
         order(process, {"arm": settings.to_dict(), "every": 0.1})
         until = time.monotonic() + PATIENCE
         while not (answers and answers[-1]["known"]):

@@ -274,3 +274,13 @@ def test_inverse_dynamics_take_a_payload_as_the_simulation_does(panda):
     carried = panda.with_payload(PAYLOAD).torque(one.q, np.zeros_like(one.q), np.zeros_like(one.q))
     bare = panda.torque(one.q, np.zeros_like(one.q), np.zeros_like(one.q))
     assert np.median(np.abs(one.tau - none.tau - carried + bare), axis=0).max() < 1.0  # gravity is most of it
+
+
+@pytest.mark.parametrize("drawn", [World.real_like, World.beyond])
+def test_an_arm_with_a_link_without_mass_is_refused_by_the_joint_that_moves_it(drawn):
+    links = arm("panda").link_parameters.copy()
+    links[2] = 0.0
+    with pytest.raises(
+        ArmError, match=r"panda gives no mass to what panda_joint3 moves: expected a mass at every joint"
+    ):
+        drawn(arm("panda").with_links(links), 1)

@@ -10,6 +10,7 @@ from math import isfinite
 from armload.errors import ArmError
 
 _MOVING = ("revolute", "continuous", "prismatic")
+_BOUNDED = ("revolute", "prismatic")  # moving joints whose limits hold
 _TYPES = (*_MOVING, "fixed", "floating", "planar")
 _ENDLESS = "1e4"  # [rad] limit given to a continuous joint, so that both engines treat it as one angle
 HELD = "held"  # marks a joint that could move, but does not move the payload frame, and is fixed at zero
@@ -20,6 +21,7 @@ _NUMBERS = {
     "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
     "limit": ("lower", "upper", "effort", "velocity"),
 }
+_VECTORS = ("xyz", "rpy")  # of three numbers; every other attribute is one
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,9 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
         where: how to name the description in an error.
 
     Raises:
-        ArmError: not a URDF, no moving joint, an unknown frame, or numbers that no body or joint can have.
+        ArmError: not a URDF, no tree of links, no moving joint, an unknown frame, none named where several ends lie
+            behind as many moving joints, a joint of the chain that mimics another, or numbers that no body or joint can
+            have.
     """
     try:
         root = ET.fromstring(xml)
@@ -61,25 +65,7 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     _strip(root)
     _check_numbers(root, where)
     links = [str(link.get("name")) for link in root.findall("link")]
-    joints: dict[str, ET.Element] = {}  # by the link they carry
-    parents: dict[str, str] = {}  # link -> the link that carries it
-    for joint in root.findall("joint"):
-        if joint.get("type") not in _TYPES:
-            raise ArmError(
-                f"joint {joint.get('name')!r} of {where} has the type {joint.get('type')!r}: expected one of "
-                f"{', '.join(_TYPES)}"
-            )
-        ends = []
-        for end in ("parent", "child"):
-            element = joint.find(end)
-            link = None if element is None else element.get("link")
-            if link not in links:
-                raise ArmError(f"joint {joint.get('name')!r} of {where} has no <{end}> among the links of the file")
-            ends.append(link)
-        parents[ends[1]] = ends[0]
-        joints[ends[1]] = joint
-    if not joints:
-        raise ArmError(f"{where} has no joints: expected a URDF of a robot arm")
+    joints, parents = _tree(root, links, where)
 
     def path(link: str) -> list[ET.Element]:
         chain: list[ET.Element] = []
@@ -93,11 +79,16 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
         if not leaves:
             raise ArmError(f"the joints of {where} run in a circle: expected a tree from the base to the tool")
 
-        def rank(link: str) -> tuple[int, int, int]:
-            chain = path(link)
-            return sum(j.get("type") in _MOVING for j in chain), len(chain), links.index(link)
-
-        frame = max(leaves, key=rank)
+        moved = {link: [j for j in path(link) if j.get("type") in _MOVING] for link in leaves}
+        most = max(map(len, moved.values()))
+        behind = {chain[-1]: leaf for leaf, chain in moved.items() if chain and len(chain) == most}  # by the last joint
+        if len(behind) > 1:
+            first, second = list(behind.values())[:2]
+            raise ArmError(
+                f"{where} has {len(behind)} ends behind as many moving joints ({most}), {first!r} and {second!r} among "
+                "them: name the link that carries the payload with --frame, such as an arm's flange"
+            )
+        frame = max(leaves, key=lambda link: (len(moved[link]), len(path(link)), links.index(link)))
     elif frame not in links:
         near = get_close_matches(frame, links, 1, cutoff=0.7)  # the links of an arm are called alike
         raise ArmError(
@@ -109,7 +100,10 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     moving = [j for j in chain if j.get("type") in _MOVING]
     if not moving:
         raise ArmError(f"no joint of {where} moves the frame {frame!r}: choose a frame behind the arm's joints")
+    _check_moving(moving, frame, where)
     for joint in joints.values():
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)
         if joint not in moving:
             if joint.get("type") in _MOVING:
                 joint.set(HELD, "true")
@@ -138,6 +132,35 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     )
 
 
+def _tree(root: ET.Element, links: list[str], where: str) -> tuple[dict[str, ET.Element], dict[str, str]]:
+    """The joint that carries each link, and the link that carries it, by the links carried."""
+    joints: dict[str, ET.Element] = {}
+    parents: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        if joint.get("type") not in _TYPES:
+            raise ArmError(
+                f"joint {joint.get('name')!r} of {where} has the type {joint.get('type')!r}: expected one of "
+                f"{', '.join(_TYPES)}"
+            )
+        ends = []
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            link = None if element is None else element.get("link")
+            if link not in links:
+                raise ArmError(f"joint {joint.get('name')!r} of {where} has no <{end}> among the links of the file")
+            ends.append(link)
+        parent, child = ends
+        if child in joints:
+            raise ArmError(
+                f"the link {child!r} of {where} is carried by two joints, {joints[child].get('name')!r} and "
+                f"{joint.get('name')!r}: expected a tree from the base to the tool, without closed loops"
+            )
+        parents[child], joints[child] = parent, joint
+    if not joints:
+        raise ArmError(f"{where} has no joints: expected a URDF of a robot arm")
+    return joints, parents
+
+
 def _check_expanded(root: ET.Element, where: str) -> None:
     """Refuse a xacro file: what its macros would add is missing from it."""
     for element in root.iter():
@@ -149,27 +172,34 @@ def _check_expanded(root: ET.Element, where: str) -> None:
 
 
 def _strip(root: ET.Element) -> None:
-    """Remove what dynamics does not need: meshes, materials, transmissions, simulator settings, mimic and damping."""
+    """Remove what dynamics does not need: meshes, materials, transmissions, simulator settings and damping."""
     for child in list(root):
         if child.tag not in ("link", "joint"):
             root.remove(child)
             continue
         for part in list(child):
-            if part.tag in ("visual", "collision", "mimic", "safety_controller", "calibration", "dynamics"):
+            if part.tag in ("visual", "collision", "safety_controller", "calibration", "dynamics"):
                 child.remove(part)
 
 
 def _check_numbers(root: ET.Element, where: str) -> None:
-    """Refuse what is no finite number, a negative mass and an axis without direction: Pinocchio's reader takes them."""
+    """Refuse what is no number or too few, a negative mass and an axis without direction.
+
+    Pinocchio's reader takes some of it, and leaves out the body that holds it.
+    """
     for part in root:
         for element in part.iter():
             for key in _NUMBERS.get(element.tag, ()):
+                if element.get(key) is None:
+                    continue
                 numbers = _numbers(element.get(key) or "")
                 if numbers is None:
                     expected = "finite numbers"
-                elif element.tag == "mass" and any(number < 0 for number in numbers):
+                elif len(numbers) != (3 if key in _VECTORS else 1):
+                    expected = "three numbers" if key in _VECTORS else "a number"
+                elif element.tag == "mass" and numbers[0] < 0:
                     expected = "a mass of at least 0"
-                elif element.tag == "axis" and part.get("type") in _MOVING and numbers and not any(numbers):
+                elif element.tag == "axis" and part.get("type") in _MOVING and not any(numbers):
                     expected = "a direction"
                 else:
                     continue
@@ -179,10 +209,29 @@ def _check_numbers(root: ET.Element, where: str) -> None:
                 )
 
 
+def _check_moving(moving: list[ET.Element], frame: str, where: str) -> None:
+    """Refuse a joint of the chain that another one drives, and limits that no joint can have."""
+    for joint in moving:
+        mimic, limit = joint.find("mimic"), joint.find("limit")
+        if mimic is not None:
+            raise ArmError(
+                f"joint {joint.get('name')!r} of {where}, which moves the frame {frame!r}, mimics "
+                f"{mimic.get('joint')!r}: expected joints with drives of their own; choose a frame before it"
+            )
+        if limit is None:
+            continue
+        lower, upper, effort, velocity = (float(limit.get(key) or 0) for key in _NUMBERS["limit"])
+        if min(effort, velocity) < 0 or (joint.get("type") in _BOUNDED and lower > upper):
+            raise ArmError(
+                f"{where}: <limit> of joint {joint.get('name')!r} has lower = {lower:g}, upper = {upper:g}, effort = "
+                f"{effort:g} and velocity = {velocity:g}, expected lower below upper and no negative limit"
+            )
+
+
 def _numbers(text: str) -> list[float] | None:
     """The numbers of an attribute; None if a word of it is no finite number."""
     try:
-        numbers = [float(word) for word in text.split()]
+        numbers = [float(word) for word in text.replace("_", "?").split()]  # Python alone reads 1_000
     except ValueError:
         return None
     return numbers if all(map(isfinite, numbers)) else None

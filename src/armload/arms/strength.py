@@ -38,6 +38,10 @@ PAYLOAD_REACH = 0.10  # [m] a payload's centre beyond the payload frame along it
 FRICTION_WIDTH = 0.06
 
 _POSES = 200
+# of the torque that holding the arm can take: the strength of a joint without a limit, or with one that does not even
+# hold the arm, as where springs bear it. By such limits a Baxter would be rated for nothing, a PR2's arm likewise; by
+# this 2.8 and 2.7 kg, where their makers say 2.2 and 1.8
+_HOLDING = 2.0
 _WEAKEST = 0.15  # of the strongest joint: 0.14 of the Panda's, 0.17 of a UR10e's
 _FULL = 0.7  # of what the joints could hold almost everywhere: makers leave room for dynamics
 # of gravity's, an acceleration in any direction that each joint gives a payload, too: joints of an arm in a horizontal
@@ -55,11 +59,14 @@ def rated_effort(arm: Arm) -> NDArray[np.float64]:
         return effort
     static = np.abs(arm.torque(poses(arm))).max(axis=0)
     carried = np.maximum.accumulate(static[::-1])[::-1]
-    return np.where(np.isfinite(effort), effort, np.maximum(2.0 * np.maximum(carried, _WEAKEST * carried[0]), 1.0))
+    return np.where(np.isfinite(effort), effort, np.maximum(_HOLDING * np.maximum(carried, _WEAKEST * carried[0]), 1.0))
 
 
 def rated_mass(arm: Arm) -> float:
-    """What the arm may carry [kg]: the maker's figure, or 0.7 of what its joints hold and move in 95 % of all poses."""
+    """What the arm may carry [kg]: the maker's figure, or 0.7 of what its joints hold and move in 95 % of all poses.
+
+    A joint whose effort limit is less than the arm's own weight takes has twice that torque in its place.
+    """
     return arm.rated_payload if arm.rated_payload is not None else _assumed_mass(arm)
 
 
@@ -73,7 +80,8 @@ def _assumed_mass(arm: Arm) -> float:
     turn, shift = np.split(arm.frame_motion(q).jacobian, 2, axis=1)
     reach = np.linalg.norm(shift, axis=1) + PAYLOAD_REACH * np.linalg.norm(turn, axis=1)  # at most, wherever it is
     moved = _MOVED * np.linalg.norm(arm.gravity) * reach
-    room = np.maximum(rated_effort(arm) - np.abs(bare), 0.0)
+    strength, weight = rated_effort(arm), np.abs(bare).max(axis=0)
+    room = np.where(weight < strength, strength, _HOLDING * weight) - np.abs(bare)
     return float(max(0.05, _FULL * np.quantile((room / np.maximum(held, moved)).min(axis=1), 0.05)))
 
 

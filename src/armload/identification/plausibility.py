@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.errors import RecordingError
 from armload.identification.thresholds import (
     ANY_SPEED,
@@ -63,7 +64,7 @@ def _check_radians(recording: Recording, arm: Arm) -> None:
     outside, fits = 0, True
     for q in parts_of(recording.q):
         outside += int(np.any(_beyond(q, arm) > POSITION_TOLERANCE, axis=1).sum())
-        fits = fits and bool(np.all(_beyond(q / _DEGREE, arm) <= POSITION_TOLERANCE))
+        fits = fits and bool(np.all(_beyond(np.where(arm.limits.slides, q, q / _DEGREE), arm) <= POSITION_TOLERANCE))
     most, rows = largest(recording.q)
     if outside > 0.5 * len(recording) and np.sum(most > DEGREES_FROM) >= min(2, arm.n) and fits:
         j = int(np.argmax(most))
@@ -83,17 +84,21 @@ def _check_limits(recording: Recording, arm: Arm) -> None:
             first += len(q)
             continue
         k, j = first + bad[0][0], bad[0][1]
-        low, high = arm.limits.position_low[j], arm.limits.position_high[j]
+        low, high, unit = arm.limits.position_low[j], arm.limits.position_high[j], _unit(arm, j)
         raise RecordingError(
-            f"{recording.source}: q{j + 1} = {q[bad[0][0], j]:.4f} rad at {row_of(recording, k)} is outside the limits "
-            f"of {arm.name}'s {arm.joint_names[j]} ({low:.4f} to {high:.4f} rad): expected the joint positions of this "
-            "robot; check the robot, the order of the joints and the unit"
+            f"{recording.source}: q{j + 1} = {q[bad[0][0], j]:.4f} {unit} at {row_of(recording, k)} is outside the "
+            f"limits of {arm.name}'s {arm.joint_names[j]} ({low:.4f} to {high:.4f} {unit}): expected the joint "
+            "positions of this robot; check the robot, the order of the joints and the unit"
         )
 
 
 def _beyond(q: NDArray[np.float64], arm: Arm) -> NDArray[np.float64]:
     """How far positions (N, n) lie outside the limits [rad]; −inf where there is no limit."""
     return np.maximum(arm.limits.position_low - q, q - arm.limits.position_high)
+
+
+def _unit(arm: Arm, j: np.intp | int) -> str:
+    return unit_of("position", arm.limits.slides[j])
 
 
 def _check_jumps(recording: Recording, arm: Arm) -> None:
@@ -108,7 +113,7 @@ def _check_jumps(recording: Recording, arm: Arm) -> None:
         k, j = bad[0]
         wrap = " (a full turn: unwrap the angle)" if abs(jump[k, j] - _FULL_TURN) < 0.3 else ""
         raise RecordingError(
-            f"{recording.source}: q{j + 1} jumps by {jump[k, j]:.3f} rad in {step[k, 0]:.4g} s at "
+            f"{recording.source}: q{j + 1} jumps by {jump[k, j]:.3f} {_unit(arm, j)} in {step[k, 0]:.4g} s at "
             f"{row_of(recording, rows.start + k + 1)}{wrap}: expected a continuous motion; remove the rows or "
             "split the log there"
         )
@@ -126,8 +131,9 @@ def _check_pace(recording: Recording, arm: Arm) -> None:
         k, j = part.start + bad[0][0], int(bad[0][1])
         away = abs(float(recording.q[k : k + 1][0, j] - start[j]))
         raise RecordingError(
-            f"{recording.source}: q{j + 1} changes by {away:.3f} rad in {recording.t[k] - recording.t[0]:.2g} s, which "
-            f"{arm.joint_names[j]} cannot do (its limit is {speed[j]:.4g} rad/s): expected s, but t looks too small; "
+            f"{recording.source}: q{j + 1} changes by {away:.3f} {_unit(arm, j)} in "
+            f"{recording.t[k] - recording.t[0]:.2g} s, which {arm.joint_names[j]} cannot do (its limit is "
+            f"{speed[j]:.4g} {_unit(arm, j)}/s): expected s, but t looks too small; "
             "check its unit, --columns t_unit=…"
         )
 

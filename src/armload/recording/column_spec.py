@@ -30,6 +30,7 @@ class ColumnSpec:
     Args:
         t: the column of time. q, dq, tau: those of position, velocity and torque; dq may be "none".
         t_unit: s, ms, us or ns. q_unit: rad or deg. dq_unit: rad/s or deg/s. tau_unit: Nm, or A for motor currents.
+            Joints that slide are in m, m/s and N in any case.
         torque_constants: joint torque per motor current (n,) [N·m/A], where tau is in A.
         compensated: where a controller has taken gravity out of the torque, the payload it was set to carry: a file, or
             "nothing".

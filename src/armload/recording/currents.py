@@ -42,6 +42,17 @@ def no_constants(where: str, what: str, arm: Arm | None, n: int, instead: str = 
     )
 
 
+def factors(key: str, unit: str | None, arm: Arm | None, n: int) -> tuple[float, ...]:
+    """What a quantity of n joints in a unit is multiplied with (n,) to be in rad, rad/s or N·m.
+
+    What is said of angles holds of the joints that turn: those of the arm that slide are in m and m/s.
+    """
+    factor = 1.0 if unit is None else UNITS[key][unit.strip().lower()]
+    if arm is None or arm.n != n or key == "tau":
+        return (factor,) * n
+    return tuple(1.0 if slides else factor for slides in arm.limits.slides)
+
+
 def in_si(spec: ColumnSpec, arm: Arm | None, n: int, where: str) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """What the values of a message (3n,) are multiplied with to be in rad, rad/s, N·m, and a note on currents.
 
@@ -50,8 +61,7 @@ def in_si(spec: ColumnSpec, arm: Arm | None, n: int, where: str) -> tuple[NDArra
     """
     scale = np.ones((3, n))
     for row, key in zip(scale, QUANTITIES, strict=True):
-        unit = getattr(spec, f"{key}_unit")
-        row *= 1.0 if unit is None else UNITS[key][unit.strip().lower()]
+        row *= factors(key, getattr(spec, f"{key}_unit"), arm, n)
     if not spec.of_currents:
         return scale.ravel(), ()
     constants = torque_constants(spec, arm, n, where)

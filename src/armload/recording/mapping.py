@@ -17,7 +17,7 @@ from armload.recording.aliases import AMPERE, CALLED, EPISODE, FORMS, QUANTITIES
 from armload.recording.choice import WHY_NOT, Header, TimeColumns, some
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import check_joint_count, column_names
-from armload.recording.currents import no_constants, of_currents, torque_constants
+from armload.recording.currents import factors, no_constants, of_currents, torque_constants
 from armload.recording.header import Family, Reading, families_of, read_name, wanted_of, words_of
 from armload.recording.templates import abridged, named_columns
 
@@ -214,7 +214,7 @@ def _scale(header: Header, key: str, places: list[int], spec: ColumnSpec) -> tup
             f"{', '.join(UNITS[key])}; say which with --columns {key}_unit=…"
         )
     if unit.strip().lower() != AMPERE:
-        return (UNITS[key][unit.strip().lower()],) * header.n, []
+        return factors(key, unit, header.arm, header.n), []
     constants = torque_constants(spec, header.arm, header.n, header.where)
     return None if constants is None else (constants, [of_currents(header.where, constants)])
 

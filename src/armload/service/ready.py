@@ -20,14 +20,14 @@ def ready(kinds: Iterable[dict[str, Any]]) -> list[Reader]:
     """Import, load and compute once what an arm of each kind needs.
 
     Args:
-        kinds: {"robot": …, "method": …} each, as in `ArmSettings`.
+        kinds: {"robot": …, "frame": …, "method": …} each, as in `ArmSettings`.
 
     Returns:
         A reader that waits for its order, for each number of joints.
     """
     readers: dict[int, Reader] = {}
     for kind in kinds:
-        made = arm(kind["robot"])
+        made = arm(kind["robot"], kind["frame"])
         if made.n not in readers:
             readers[made.n] = Reader(columns_of(made.n))
         middle = np.clip(np.zeros(made.n), made.limits.position_low + _SWING, made.limits.position_high - _SWING)

@@ -24,10 +24,14 @@ class Spare:
 
     Args:
         arms: of the service. wanted: whether there is to be one at all.
+
+    Attributes:
+        kinds: what the arms of the service need, each once (`ready`).
     """
 
     def __init__(self, arms: Iterable[ArmSettings], wanted: bool = True) -> None:
-        self._kinds = [dict(kind) for kind in {(("robot", arm.robot), ("method", arm.method)) for arm in arms}]
+        kinds = {(arm.robot, arm.frame, arm.method) for arm in arms}
+        self.kinds = [dict(zip(("robot", "frame", "method"), kind, strict=True)) for kind in kinds]
         self._wanted, self._lock = wanted, threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -44,7 +48,7 @@ class Spare:
         with self._lock:
             if self._wanted and (self._process is None or self._process.poll() is not None):
                 self._process = _started()
-                order(self._process, {"ready": self._kinds})
+                order(self._process, {"ready": self.kinds})
 
     def close(self) -> None:
         """End it."""

@@ -124,7 +124,7 @@ class World:
         """
         rng = np.random.default_rng([seed, 1])
         offset, friction, residual = sizes(arm)
-        links = np.array([perturbed(phi, rng, np.full(3, arm.link_spread)) for phi in _bare_links(arm)])
+        links = _perturbed_links(arm, rng, np.full(3, arm.link_spread))
         offset = offset * rng.normal(size=arm.n)
         level, rotor = on_motor(arm, rng) if arm.motor_torque else (friction, None)
         friction = any_friction(level, rng, True) if arm.motor_torque else plain_friction(level, rng)
@@ -168,7 +168,7 @@ class World:
         smooth = SmoothTorque.of_length(np.sqrt(1 - share**2) * heavier[5] * residual, LENGTHS, rng)
         worst = MOTOR_GAIN if motor_side else GAIN
         warming = float(np.exp(rng.uniform(*np.log(_WARMING))))
-        links = np.array([perturbed(phi, rng, arm.link_spread * heavier[:3]) for phi in _bare_links(arm)])
+        links = _perturbed_links(arm, rng, arm.link_spread * heavier[:3])
         offset = heavier[3] * usual * rng.normal(size=arm.n)
         friction = any_friction(level, rng, arm.motor_torque)
         return cls(
@@ -240,3 +240,14 @@ class World:
 
 def _bare_links(arm: Arm) -> NDArray[np.float64]:
     return (arm if arm.attached is None else replace(arm, attached=None)).link_parameters
+
+
+def _perturbed_links(arm: Arm, rng: np.random.Generator, spread: NDArray[np.float64]) -> NDArray[np.float64]:
+    links = _bare_links(arm)
+    light = [joint for joint, phi in zip(arm.joint_names, links, strict=True) if phi[0] <= 0.0]
+    if light:
+        raise ArmError(
+            f"the description of {arm.name} gives no mass to what {', '.join(light)} move{'s' * (len(light) == 1)}: "
+            "expected a mass at every joint of an arm that is simulated; complete the description"
+        )
+    return np.array([perturbed(phi, rng, spread) for phi in links])

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import Parser, file_name, output_file
 from armload.app.cli.export_frame import frame_for, no_flange, on_flange
-from armload.app.cli.named import load_of, part_of
+from armload.app.cli.named import BUILT_IN, load_of, part_of
 from armload.app.cli.printing import print_note
-from armload.errors import UsageError
+from armload.errors import ArmError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -88,8 +88,9 @@ def run(options: argparse.Namespace) -> None:
     from armload.arms import ARMS
     from armload.payloads import NOTHING
 
-    arm = None if options.robot is None else _arm(options.robot, options.frame)
-    load = load_of(options.result, arm)
+    saved = None if options.result in BUILT_IN else load_of(options.result)
+    arm = None if options.robot is None else _arm(options.robot, options.frame, saved and saved.frame)
+    load = saved or load_of(options.result, arm)
     facts = ARMS.get(load.robot or "")
     if arm is None and facts is not None and _moves(options, load.frame, facts.flange):
         arm = _arm(facts.name)
@@ -162,10 +163,16 @@ def write(
         print_note(f"{out}: {body.description()[0]}")  # what else is said of it, the notes have said
 
 
-def _arm(robot: str, frame: str | None = None) -> Arm:
+def _arm(robot: str, frame: str | None = None, held: str | None = None) -> Arm:
+    """An arm about a frame; of a description with several ends, where none is asked for, about what is held."""
     from armload.arms import arm  # with Pinocchio: only for who needs it
 
-    return arm(robot, frame)
+    try:
+        return arm(robot, frame)
+    except ArmError:
+        if frame is not None or held is None:
+            raise
+        return arm(robot, held)
 
 
 def _moves(options: argparse.Namespace, frame: str | None, flange: str) -> bool:

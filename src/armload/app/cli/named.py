@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armload.simulation import World
 
 _SIMULATED = "panda"
-_BUILT_IN = ("franka-hand", "test")  # payloads that need no file
+BUILT_IN = ("franka-hand", "test")  # payloads that need no file
 
 
 def columns_of(options: argparse.Namespace, of_tare: bool = False) -> ColumnSpec:
@@ -180,7 +180,7 @@ def load_of(name: str, arm: Arm | None = None) -> Load:
     """What is told to a controller: a payload file, a saved result or a built-in payload, with how well it is known."""
     from armload.devices import Load, read_load
 
-    return Load(payload_of(name, arm)) if name in _BUILT_IN else read_load(name)
+    return Load(payload_of(name, arm)) if name in BUILT_IN else read_load(name)
 
 
 def part_of(name: str, frame: str | None, arm: Arm | None) -> Load:

@@ -129,11 +129,14 @@ def run(options: argparse.Namespace) -> None:
         print_note(note)
     profile = in_time(profile)
     if options.json:
-        print_json(fields_of(profile) | {"out": options.out})
+        print_json(fields_of(profile, arm) | {"out": options.out})
         return
-    print_profile(profile, arm.motor_torque)
+    print_profile(profile, arm.motor_torque, arm)
     size = Path(options.out).stat().st_size / 1e6
-    use = f"armload identify LOG --robot {options.robot} --profile {options.out}"
+    same = "" if options.frame is None else f" --frame {options.frame}"
+    if options.gravity is not None:
+        same += f" --gravity {','.join(f'{x:g}' for x in options.gravity)}"
+    use = f"armload identify LOG --robot {options.robot}{same} --profile {options.out}"
     print(f"wrote {options.out} ({size:.1f} MB); use it with: {use}")
 
 
@@ -154,6 +157,7 @@ def _check_frame(known: Profile, arm: Any, frame: str | None) -> None:
 
 
 def _show(options: argparse.Namespace) -> None:
+    from armload.arms import ARMS
     from armload.posterior import load_profile
 
     if len(options.logs) != 2:
@@ -166,6 +170,8 @@ def _show(options: argparse.Namespace) -> None:
     arm = None
     if options.robot is not None:
         options.gravity = profile.gravity if options.gravity is None else options.gravity
+        if options.frame is None and options.robot not in ARMS:
+            options.frame = profile.frame
         arm = arm_of(options)
         profile.check(arm)
     if options.figure is not None:
@@ -173,9 +179,9 @@ def _show(options: argparse.Namespace) -> None:
 
         write_profile_figure(profile, _arm_of(profile) if arm is None else arm, options.figure)
     if options.json:
-        print_json(fields_of(profile))
+        print_json(fields_of(profile, arm))
         return
-    print_profile(profile, of_motors(profile) if arm is None else arm.motor_torque)
+    print_profile(profile, of_motors(profile) if arm is None else arm.motor_torque, arm)
     if options.figure is not None:
         print_note(f"wrote {options.figure}")
 

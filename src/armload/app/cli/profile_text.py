@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from armload.app.cli.printing import console, print_note, table
 
 if TYPE_CHECKING:
+    from armload.arms import Arm
     from armload.posterior import Profile
     from armload.posterior.profile import SessionRecord
 
@@ -37,8 +38,8 @@ def in_time(profile: Profile) -> Profile:
     return replace(profile, sessions=tuple(one if one.date is None else next(rest) for one in profile.sessions))
 
 
-def fields_of(profile: Profile) -> dict[str, Any]:
-    """The profile as one JSON object."""
+def fields_of(profile: Profile, arm: Arm | None = None) -> dict[str, Any]:
+    """The profile as one JSON object; arm: whose it is, where that is at hand."""
     from dataclasses import asdict
 
     n = profile.n
@@ -55,12 +56,16 @@ def fields_of(profile: Profile) -> dict[str, Any]:
         "drift_offset": drift[0].tolist(),
         "drift_coulomb": drift[1].tolist(),
         "sessions": [asdict(session) for session in profile.sessions],
-        "next": list(next_steps(profile)),
+        "next": list(next_steps(profile, arm)),
     }
 
 
-def print_profile(profile: Profile, motors: bool) -> None:
-    """Print the profile on stdout and what to do about it on stderr; `motors`: its torque is measured at the motors."""
+def print_profile(profile: Profile, motors: bool, arm: Arm | None = None) -> None:
+    """Print the profile on stdout and what to do about it on stderr.
+
+    motors: its torque is measured at the motors. arm: whose it is, where that is at hand.
+    """
+    from armload.arms.units import heading
     from armload.inertia import Z95
     from armload.posterior.drift import CHANGED
 
@@ -70,7 +75,9 @@ def print_profile(profile: Profile, motors: bool) -> None:
         f"{profile.arm_name} about {profile.frame}: {count}, {profile.duration:.0f} s, "
         f"{profile.features.pose} features of the pose, noise counted {profile.repeated:g} times"
     )
-    rows = table("from session to session, 1 sigma [N·m]", "", *(f"joint {j + 1}" for j in range(n)))
+    slides = [False] * n if arm is None else arm.limits.slides
+    torque = heading("torque", slides).removeprefix("torque ")
+    rows = table(f"from session to session, 1 sigma {torque}", "", *(f"joint {j + 1}" for j in range(n)))
     for name, values in (("offset", drift[0]), ("Coulomb friction", drift[1])):
         rows.add_row(name, *(f"{x:.3f}" for x in values))
     if profile.gain is not None and profile.gain_std is not None:
@@ -79,7 +86,7 @@ def print_profile(profile: Profile, motors: bool) -> None:
             rows.add_row("± (95 %)", *(f"{Z95 * x:.3f}" for x in profile.gain_joint_std))
         print(f"a known weight was hung on: the torque is known to {100 * profile.gain_std:.1f} %")
     console().print(rows)
-    rows = table("sessions", "log", "time [s]", "offsets [N·m]", "misfit", "noise")
+    rows = table("sessions", "log", "time [s]", f"offsets {torque}", "misfit", "noise")
     for session in profile.sessions:
         offsets = " ".join(f"{x:+.2f}" for x in session.offset)
         name, time = _name(session), f"{session.duration:.0f}"
@@ -96,7 +103,7 @@ def print_profile(profile: Profile, motors: bool) -> None:
     )
     if motors:
         print_note(_OF_MOTORS)
-    for line in next_steps(profile):
+    for line in next_steps(profile, arm):
         print_note(line)
 
 
@@ -114,7 +121,7 @@ def _most(profile: Profile) -> float:
     return min(CHANGED, float(chi2.isf(_ASKED / len(profile.sessions), 3 * profile.n)))
 
 
-def next_steps(profile: Profile) -> tuple[str, ...]:
+def next_steps(profile: Profile, arm: Arm | None = None) -> tuple[str, ...]:
     """What to record next, and what does not fit."""
     from armload.posterior.drift import CHANGED
     from armload.posterior.torque_gain import common_gain
@@ -142,7 +149,8 @@ def next_steps(profile: Profile) -> tuple[str, ...]:
             "new profile of all these logs, as --update keeps what was chosen for the first"
         )
     moved = profile.poses.max(axis=0) - profile.poses.min(axis=0)
-    still = [str(j + 1) for j in range(profile.n) if moved[j] < 0.5]
+    turns = [arm is None or not arm.limits.slides[j] for j in range(profile.n)]  # in rad: a joint that slides has m
+    still = [str(j + 1) for j in range(profile.n) if turns[j] and moved[j] < 0.5]
     if still:
         joints = f"joint{'s' if len(still) > 1 else ''} {', '.join(still)}"
         advice.append(
