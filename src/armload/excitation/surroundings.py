@@ -82,7 +82,7 @@ class Surroundings:
         what = self.nearest(start[None], k)
         raise MotionError(
             f"at the start {what} ({found[k]:.3f} m between their capsules): start elsewhere, or say what is there "
-            "(--floor, --box, --held)"
+            "(--floor, --box and, of `armload motion`, --held)"
         )
 
     def nearest(self, q: NDArray[np.float64], kind: int) -> str:
