@@ -152,6 +152,7 @@ def test_without_a_motion_one_about_the_present_pose_is_designed(tmp_path, monke
         (["--motion", "MOTION", "--move", "--box", "0.5,0,0.6,0.3,0.3,0.3"], "the arm hits a box"),
         (["--at", "0,1,2", "--dry-run"], "--at has 3 joint positions: panda has 7"),
         (["--at", "0,-0.5,0,-2,0,1.6,0.8", "--move", "--box", "0.5,0,0.6,0.3,0.3,0.3"], "is at box 1"),
+        (["--at", "0,-0.5,0,-2,0,1.6,0.8", "--move", "--floor", "0.6"], "--box and, of `armload motion`, --held)"),
         (
             ["--at", "0,0.9,0,-0.9,0,1.6,0.8", "--move", "--mass", "4.5±0.01"],
             "`armload motion design` makes, for --motion",

@@ -474,6 +474,15 @@ def test_limits_are_the_makers(panda):
     assert np.all(np.isinf(arm("ur10e").limits.jerk))
 
 
+def test_the_middle_of_a_range_without_two_ends_is_within_it_and_no_warning():
+    limits = arm("gen3").limits
+    endless = np.isinf(limits.position_low)
+    assert endless.any()
+    np.testing.assert_array_equal(limits.middle[endless], 0.0)
+    one_end = replace(limits, position_low=np.where(endless, 0.5, limits.position_low))
+    np.testing.assert_array_equal(one_end.middle[endless], 0.5)
+
+
 # ---------------------------------------------------------------------- descriptions
 
 

@@ -1,5 +1,7 @@
 """An arm that is moved: where a movement may begin, that it ends at rest, and what stops it."""
 
+import itertools
+import re
 import sys
 from types import SimpleNamespace
 
@@ -234,6 +236,21 @@ def test_a_ur_that_takes_no_movements_is_a_sentence_whatever_else_fails(ur, fail
     with pytest.raises(SafetyError, match=f"does not take movements .{fails}: no.: switch it on"):
         mover.follow(motion)
     assert not mover.moving
+    mover.close()
+
+
+def test_a_ur_that_does_not_follow_is_stopped_and_what_may_hold_it_is_said(ur):
+    """In a protective stop, or behind a speed slider, states and targets go on as if nothing had happened."""
+    mover, controls = ur("")
+    controls.servoJ = lambda *_: True
+    looks = itertools.count()  # each state is looked at twice
+    mover._source.client.getTimestamp = lambda: 1.0 + CYCLE * (next(looks) // 2)
+    mover._source.client.getActualQ = mover._source.client.getActualCurrent = lambda: [0.0] * 6
+    mover.follow(StraightMotion(np.zeros(6), 0.3 * np.ones(6), 2.0), Thresholds(external=1e3))
+    for _ in mover:
+        if not mover.moving:
+            break
+    assert re.search(r"off the path .*see on its pendant whether it is stopped or paused, and .*slider", mover.why)
     mover.close()
 
 

@@ -1,5 +1,6 @@
 """Designed motions keep to what was asked; requests that cannot be met name the limit in the way."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -208,6 +209,25 @@ def test_a_start_that_touches_is_refused_with_what_touches(panda):
     ):
         with pytest.raises(MotionError, match=words):
             Constraints(panda, READY, surroundings=around)
+
+
+def test_a_joint_that_its_limits_lock_stands_and_the_others_move(panda, tmp_path):
+    """Its least stir counted as a limit that was passed a million times over, and no motion was found."""
+    locked = re.sub(
+        r'(?s)(<joint name="panda_joint5".*?)lower="[^"]*" upper="[^"]*"', r'\1lower="0" upper="0"', panda.urdf
+    )
+    (tmp_path / "locked.urdf").write_text(locked)
+    robot = arm(tmp_path / "locked.urdf", panda.frame)
+    limits = Constraints(robot, READY, payload=PayloadRange(1.5))
+    motion = design_motion(limits, Criterion(robot, "same"), 2.0, **QUICK).motion
+    assert problems(limits, motion) == []
+    went = np.ptp(motion(np.linspace(0.0, 2.0, 500))[0], axis=0)
+    assert went[4] == 0.0
+    assert went.max() > 0.3
+    with pytest.raises(MotionError, match="the limits of panda_joint5 leave no room"):
+        replace(limits, joints=np.arange(7) == 4)
+    with pytest.raises(MotionError, match=r"panda_joint5 starts at 0\.1 rad, outside .* \(its limits are 0 and 0\)"):
+        replace(limits, start=READY + 0.1 * np.eye(7)[4])
 
 
 def test_a_time_that_leaves_no_motion_is_refused(panda):

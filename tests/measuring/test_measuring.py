@@ -205,16 +205,31 @@ def test_movements_are_checked_with_the_payload_that_was_weighed(panda):
 def test_an_interrupted_arm_comes_to_rest_and_its_log_can_be_read(panda, simulated, tmp_path, number):
     before = signal.getsignal(signal.SIGINT)  # what a shell runs in the background ignores it
     mover, orders = simulated(kind=Restless, do=lambda _: signal.raise_signal(number)), Orders()
-    procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP)
+    procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP, say=orders.seen.append)
     with pytest.raises(KeyboardInterrupt):
         procedure.run(orders.consent, orders.mount(mover))
     assert mover.why == f"interrupted by {number.name}"
+    log = f"what was recorded until then is in {tmp_path / 'loaded.csv'}"
+    assert f"the arm was interrupted on its way with the payload, and it is at rest; {log}" in orders.seen
     loaded = read_recording(tmp_path / "loaded.csv", panda)
     assert 100 <= len(loaded) < 400
     assert np.abs(loaded.dq).max() > 0.1
     assert np.abs(loaded.dq[-1]).max() < 0.02
     assert np.ptp(poses(mover), axis=0).max() < 0.01
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_who_interrupts_an_arm_that_is_lost_is_not_told_that_it_rests(panda, simulated, tmp_path):
+    def lose(_):
+        signal.raise_signal(signal.SIGINT)
+        raise SourceError("the arm was lost")
+
+    mover, orders = simulated(kind=Restless, do=lose), Orders()
+    with pytest.raises(KeyboardInterrupt):
+        Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP, say=orders.seen.append).run(
+            orders.consent, orders.mount(mover)
+        )
+    assert any("with the payload, and whether it rests is not known" in str(said) for said in orders.seen)
 
 
 def test_a_push_ends_the_measurement_with_a_sentence(panda, simulated, tmp_path):

@@ -98,6 +98,8 @@ def test_a_motions_name_cannot_break_out_of_its_comment(tmp_path, ur_motion):
         ({"format": "xml"}, "csv, ros2, ur"),
         ({"rate": 0.0}, "positive"),
         ({"rate": float("nan")}, "positive"),
+        ({"rate": 0.2}, "joint .* would be up to .* off the motion 'taie2024' between two of them"),
+        ({"rate": 2.0}, "give a higher rate"),
         ({"format": "ros2"}, "joint_names"),
         ({"format": "ros2", "joint_names": ["a"]}, "1 joint names for a motion of 7"),
         ({"format": "ros2", "joint_names": list("abcdefg"), "lead": -1.0}, "lead"),

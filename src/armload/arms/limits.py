@@ -27,9 +27,10 @@ class Limits:
 
     @property
     def middle(self) -> NDArray[np.float64]:
-        """The middle of each joint's range (n,) [rad, m]; 0 where it has no limits."""
-        middle = 0.5 * (self.position_low + self.position_high)
-        return np.where(np.isfinite(middle), middle, 0.0)
+        """The middle of each joint's range (n,) [rad, m]; the position nearest to 0 where that has no two ends."""
+        ends = np.stack([self.position_low, self.position_high])
+        middle = np.where(np.isfinite(ends).all(axis=0), ends, 0.0).mean(axis=0)
+        return np.clip(middle, *ends)
 
     def as_degrees(self, q: ArrayLike) -> str:
         """A question to whoever named a pose (n,) [rad] that is beyond the limits, and would be within them in degrees.

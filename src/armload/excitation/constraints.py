@@ -32,9 +32,10 @@ SHORTEST, LONGEST = 0.2, 60.0  # [s] of a designed motion
 class Constraints:
     """What a motion from `start` (n,) [rad] and back must keep to.
 
-    joints: (n,) which of them may move. share: of each limit. travel [rad]; speed: of the payload frame [m/s].
-    payload: what may be mounted. surroundings: floor, boxes, what is held. path_uses: by quantity ("acceleration",
-    "jerk"), what a path uses by itself (n,): where the maker gives no limit, that and the assumed one are allowed.
+    joints: (n,) which of them may move; those whose limits leave no room do not. share: of each limit. travel [rad];
+    speed: of the payload frame [m/s]. payload: what may be mounted. surroundings: floor, boxes, what is held.
+    path_uses: by quantity ("acceleration", "jerk"), what a path uses by itself (n,): where the maker gives no limit,
+    that and the assumed one are allowed.
 
     Raises:
         MotionError: a number out of range, or a start that the constraints forbid, with the limit that stands in the
@@ -79,6 +80,11 @@ class Constraints:
         if moving.shape != (n,) or not moving.any():
             raise MotionError(f"no joint of {arm.name} may move: name some of its {n} joints")
         self._check_start()
+        if not len(self.moving):
+            named = ", ".join(name for name, may in zip(arm.joint_names, moving, strict=True) if may)
+            raise MotionError(
+                f"no joint of {arm.name} can move: the limits of {named} leave no room; name one that they leave some"
+            )
 
     @cached_property
     def low(self) -> NDArray[np.float64]:
@@ -136,9 +142,9 @@ class Constraints:
 
     @property
     def moving(self) -> NDArray[np.intp]:
-        """Which joints may move."""
+        """Which joints move: they may, and their limits leave them room."""
         assert self.joints is not None
-        return np.flatnonzero(self.joints)
+        return np.flatnonzero(self.joints & (self.high > self.low))
 
     @cached_property
     def _band(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -156,7 +162,8 @@ class Constraints:
             limits = arm.limits
             middle = (limits.position_low[j] + limits.position_high[j]) / 2
             unit = unit_of("position", limits.slides[j])
-            needed = abs(self.start[j] - middle) / (limits.position_high[j] - middle)
+            half = limits.position_high[j] - middle
+            needed = abs(self.start[j] - middle) / half if half > 0 else np.inf  # a joint that is locked
             raise MotionError(
                 f"{arm.joint_names[j]} starts at {self.start[j]:.4g} {unit}, outside {self.share:g} of its range about "
                 f"the middle, {low[j]:.4g} to {high[j]:.4g} {unit} (its limits are {limits.position_low[j]:.4g} and "

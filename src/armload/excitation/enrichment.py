@@ -6,12 +6,14 @@
 The change is made of quintic splines on each stretch between stops that start and end at rest with it: ends, stops and
 times stay as they are, exactly. What costs nothing at the flange, motion in the arm's own null space, is found first,
 as the tube (`tube.py`) does not hold it back. What is found is checked at 1 kHz by other code, and made smaller until
-it passes; no change at all passes if the path does.
+it passes; no change at all passes if the path does. One of which little would be left is looked for further first, at
+the points that are handed out and with a heavier penalty.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +22,7 @@ from armload.arms.units import unit_of
 from armload.errors import MotionError
 from armload.excitation.constraints import Constraints
 from armload.excitation.criterion import Criterion
-from armload.excitation.optimisation import Climb
+from armload.excitation.optimisation import AGAIN, MUCH_SMALLER, Climb
 from armload.excitation.surroundings import Surroundings
 from armload.excitation.track import Track
 from armload.excitation.tube import Tube, away, poses
@@ -39,6 +41,7 @@ _REACH = 0.03  # [rad] that a control point is scaled by
 _POINTS = 100.0  # [Hz] of the path that is handed out
 _SHRINKS, _SHRINK = 40, 0.95
 _INSIDE = 0.999
+_NEARER = 1e-3  # [m] that a change may come nearer to what the path nearly touches
 # no change at all, of which 0 is asked: what no robot repeats. Motion that costs nothing at the flange does so to
 # first order alone
 _NO_DISTANCE, _NO_ANGLE = 1e-5, np.deg2rad(0.01)  # [m], [rad]
@@ -103,15 +106,29 @@ def enrich(
             f"the path {path.name!r} has no stretch of {_SHORTEST:g} s between stops: there is nothing to change"
         )
     track = Track(path, path.duration, stretches)
-    tube = Tube(arm, track.base_at(track.sampled(_RATE).t, 0), distance, angle)
     reach = np.full(arm.n, min(_REACH, 3.0 * max(angle, distance / 0.3)))
-    problem = Climb(constraints, criterion, [track], [reach], tube, _RATE)
+
+    def sampled_at(rate: float, spare: float = 0.0) -> Climb:
+        tube = Tube(arm, track.base_at(track.sampled(rate).t, 0), distance, angle)
+        return Climb(constraints, criterion, [track], [reach], tube, rate, spare)
+
+    def held_back(x: NDArray[np.float64]) -> _HeldBack:
+        return _held_back(constraints, path, track, problem.points(x)[0], distance, angle)
+
+    problem = sampled_at(_RATE)
     x = 0.3 * np.random.default_rng(seed).normal(size=problem.size)
     for iterations, weight in _STAGES:
         x = problem.climb(x, iterations, weight)[0]
-    motion, far, turned, found = _held_back(constraints, path, track, problem.points(x)[0], distance, angle)
-    before, after = problem.evaluated([path]).half_width, problem.evaluated([motion]).half_width
-    return Enriched(motion, before, after, far, turned, found)
+    found = [held_back(x)]
+    # of 30 task paths at random 16 used 4.5 mm or more of their 5 without this, and 29 with it: most by their jerk
+    if found[0].size < MUCH_SMALLER:
+        found.append(held_back(sampled_at(_POINTS, _NEARER / 2.0).climb(x, *AGAIN)[0]))
+    passing = [one for one in found if one.passes]
+    if not passing:
+        raise MotionError(f"no change of the path {path.name!r} keeps to the constraints: {found[-1].in_the_way}")
+    best = max(passing, key=lambda one: problem.evaluated([one.motion]).value)
+    before, after = problem.evaluated([path]).half_width, problem.evaluated([best.motion]).half_width
+    return Enriched(best.motion, before, after, best.distance, best.angle, best.used)
 
 
 def touched_by(path: Motion, around: Surroundings) -> str | None:
@@ -132,8 +149,12 @@ def _poses(path: Motion) -> NDArray[np.float64]:
 
 
 def moving_stretches(path: Motion) -> list[tuple[float, float, int]]:
-    """From, to [s] and control points of the stretches between stops that are long enough to be changed."""
-    t = path.instants(200.0)
+    """From, to [s] and control points of the stretches between stops that are long enough to be changed.
+
+    They begin and end at points of the path that is handed out: the jerk of a change jumps there, and a quintic between
+    two points would swing about a jump amid them.
+    """
+    t = path.instants(_POINTS)
     moves = np.abs(path.velocity(t)).max(axis=1) > _STILL
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(int)))
     out = []
@@ -187,7 +208,7 @@ def _as_the_path(constraints: Constraints, path: Motion) -> Constraints:
     is assumed of such an arm on top: a task's path that runs every day may jump in its acceleration.
     """
     own = constraints.around.clearance(_poses(path)).min(axis=0)
-    keep = np.minimum(constraints.around.keep, np.where(np.isfinite(own), own - 1e-3, np.inf))
+    keep = np.minimum(constraints.around.keep, np.where(np.isfinite(own), own - _NEARER, np.inf))
     steps = max(4, int(np.ceil(path.duration * RATE)))
     t = np.linspace(0.0, path.duration, steps + 1)
     both = [motion.position(t) for motion in (path, PathMotion.of(path, _POINTS))]  # as it is, and as it is handed out
@@ -195,28 +216,49 @@ def _as_the_path(constraints: Constraints, path: Motion) -> Constraints:
         what: np.max([np.abs(np.diff(q, k, axis=0)).max(axis=0) for q in both], axis=0) / t[1] ** k
         for what, k in (("acceleration", 2), ("jerk", 3))
     }
-    around = replace(constraints.around, keep=tuple(keep.tolist()))
+    around = replace(constraints.around, keep=tuple(keep.tolist()), of_start=1.0)
     return replace(constraints, surroundings=around, path_uses=own)
+
+
+class _HeldBack(NamedTuple):
+    """A change made smaller: the path with it, what is left of its size, and what was found of it.
+
+    distance, angle: of the payload frame's poses at most [m, rad]. used: of each limit; empty: it leaves the tube.
+    """
+
+    motion: PathMotion
+    size: float
+    distance: float
+    angle: float
+    used: list[Used]
+
+    @property
+    def passes(self) -> bool:
+        """Whether it keeps to the tube and to every limit."""
+        return bool(self.used) and self.used[0].share <= 1.0
+
+    @property
+    def in_the_way(self) -> str:
+        """What it does not keep to, in words."""
+        return self.used[0].text if self.used else "none stays within the tube"
 
 
 def _held_back(
     constraints: Constraints, path: Motion, track: Track, c: NDArray[np.float64], distance: float, angle: float
-) -> tuple[PathMotion, float, float, list[Used]]:
-    found: list[Used] = []
-    given = poses(constraints.arm, path, RATE)
+) -> _HeldBack:
+    """The path with a change c (n, K), made smaller until it passes, or is as small as it gets."""
+    given, size = poses(constraints.arm, path, RATE), 1.0
     for _ in range(_SHRINKS):
-        changed = PathMotion.of(_Changed(track, c, path.name), _POINTS, f"{path.name}-enriched")
+        changed = PathMotion.of(_Changed(track, size * c, path.name), _POINTS, f"{path.name}-enriched")
         far, turned = (float(x.max()) for x in away(given, poses(constraints.arm, changed, RATE)))
         over = max(far / distance, turned / angle)
-        if over > _INSIDE:
-            c = c * min(_SHRINK, _INSIDE / over)
-            continue
-        found = [one for one in used(constraints, changed) if one.what != "rest"]
-        if found[0].share <= 1.0:
-            return changed, far, turned, found
-        c = c * _SHRINK
-    what = found[0].text if found else "none stays within the tube"
-    raise MotionError(f"no change of the path {path.name!r} keeps to the constraints: {what}")
+        inside = over <= _INSIDE
+        found = [one for one in used(constraints, changed) if one.what != "rest"] if inside else []
+        out = _HeldBack(changed, size, far, turned, found)
+        if out.passes:
+            break
+        size *= _SHRINK if inside else min(_SHRINK, _INSIDE / over)
+    return out
 
 
 @dataclass(frozen=True, eq=False)

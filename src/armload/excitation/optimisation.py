@@ -44,8 +44,8 @@ STAGES = ((12, 30.0), (30, 200.0), (40, 2000.0))
 # what must be left of a motion's size once it is drawn together: else the design goes on, a fifth longer, with so many
 # iterations, a penalty of such a weight, and a clearance [m] beyond what is kept, as a penalty leaves a millimetre to
 # it. Of 20 requests at random three were drawn together to 0.02, 0.29 and 0.68 of their size, and none afterwards
-_MUCH_SMALLER = 0.9
-_AGAIN, _SPARE = (20, 20_000.0), 0.002
+MUCH_SMALLER = 0.9
+AGAIN, _SPARE = (20, 20_000.0), 0.002
 _SHRINKS, _SHRINK = 60, 0.97  # how often, and by what at least, a motion is drawn together
 _INSIDE = 0.999  # of each limit that a finished motion may use: room for the rounding of exports
 _STIRRING = 0.02  # [rad] a motion that goes no farther tells nothing
@@ -109,8 +109,8 @@ def design_motion(
         x = problem.climb(x, iterations, weight)[0]
     first = problem.motions(x, name)
     motions = [_drawn_together(constraints, motion) for motion in first]
-    if any(_size(after) < _MUCH_SMALLER * _size(before) for after, before in zip(motions, first, strict=True)):
-        x = about_a_pose(constraints, criterion, times, _SPARE).climb(x, *_AGAIN)[0]
+    if any(_size(after) < MUCH_SMALLER * _size(before) for after, before in zip(motions, first, strict=True)):
+        x = about_a_pose(constraints, criterion, times, _SPARE).climb(x, *AGAIN)[0]
         again = [_drawn_together(constraints, motion) for motion in problem.motions(x, name)]
         motions = max(motions, again, key=lambda found: (_pass(constraints, found), problem.evaluated(found).value))
     for motion in motions:

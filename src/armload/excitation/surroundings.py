@@ -18,10 +18,10 @@ from armload.arms.capsules import Box
 from armload.errors import MotionError
 from armload.motion.collision import PAYLOAD_RADIUS, CapsuleArm, capsule_arm
 
-# [m] clearances that designed motions keep, as random ones do; a start that is nearer keeps half of what it has
+# [m] clearances that designed motions keep, as random ones do
 FLOOR, SELF, BOXES = 0.05, 0.01, 0.05
 KINDS = ("floor", "itself", "boxes")
-_OF_START = 0.5
+_OF_START = 0.5  # of the start's clearance, where that is less
 
 
 class Obstacle(NamedTuple):
@@ -37,7 +37,7 @@ class Surroundings:
 
     floor: height in the base's frame [m]; None: there is none. boxes: obstacles. held: radius of a ball [m], or the
     edges (3,) of a box that begins at the payload frame and lies along its z axis; 0: nothing. keep: clearances to keep
-    from the floor, itself and boxes [m].
+    from the floor, itself and boxes [m]. of_start: the share that is kept of what the start has, where that is less.
 
     Raises:
         MotionError: an edge or a radius that is not a length.
@@ -48,6 +48,7 @@ class Surroundings:
     boxes: tuple[Obstacle, ...] = ()
     held: float | tuple[float, float, float] = PAYLOAD_RADIUS
     keep: tuple[float, float, float] = (FLOOR, SELF, BOXES)
+    of_start: float = _OF_START
 
     def __post_init__(self) -> None:
         for box in self.boxes:
@@ -66,7 +67,7 @@ class Surroundings:
 
     def kept(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
         """The clearances (3,) [m] that a motion from this pose keeps."""
-        return np.minimum(self.keep, _OF_START * self.clearance(start[None])[0])
+        return np.minimum(self.keep, self.of_start * self.clearance(start[None])[0])
 
     def check_start(self, start: NDArray[np.float64]) -> None:
         """See that nothing touches at the start.
@@ -81,7 +82,7 @@ class Surroundings:
         what = self.nearest(start[None], k)
         raise MotionError(
             f"at the start {what} ({found[k]:.3f} m between their capsules): start elsewhere, or say what is there "
-            "(--floor, --box, --held)"
+            "(--floor, --box and, of `armload motion`, --held)"
         )
 
     def nearest(self, q: NDArray[np.float64], kind: int) -> str:

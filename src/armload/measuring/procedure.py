@@ -260,6 +260,10 @@ class Procedure:
                     looked = sample.t if sample.t - looked > _LOOK else looked
         except SourceError as error:
             raise SourceError(f"{error}; {_kept(log)}") from None
+        except KeyboardInterrupt:
+            now = "whether it rests is not known: see the arm" if self.mover.moving else "it is at rest"
+            self._say(f"the arm was interrupted on its way {purpose}, and {now}; {_kept(log)}")
+            raise
         finally:
             if recorder is not None:
                 recorder.close()

@@ -101,7 +101,10 @@ class Ros2Mover(StreamedMover):
     @property
     def _see(self) -> str:
         """What to look at where the arm does not follow: a topic brings no refusal."""
-        return f"see that the controller of {self._commands} is active, and whether it refuses what it is sent"
+        return (
+            f"see that the controller of {self._commands} is active, and whether it refuses what it is sent, or is "
+            "slowed down (a speed slider below 100 %)"
+        )
 
     def silence(self, seconds: float) -> str:
         """What to say where no sample came for so many seconds while the arm was on its way."""
