@@ -137,8 +137,8 @@ def several(asked: argparse.Namespace) -> None:
     file, seeds = RESULTS / "wrong_logs_again.json", [int(seed) for seed in asked.again.split(",")]
     found = json.loads(file.read_text(encoding="utf-8"))["cases"] if file.exists() else {}
     for name in asked.cases.split(";"):
-        found[name] = again(name, asked.logs, seeds)
-        write("wrong_logs_again", {"seeds": seeds, "cases": found})
+        found[name] = {"seeds": seeds} | again(name, asked.logs, seeds)
+        write("wrong_logs_again", {"cases": found})
 
 
 def main() -> None:

@@ -569,18 +569,16 @@ def test_rows_of_wrong_logs_below_the_target_are_named_with_what_other_logs_say_
         ("the same, something light", 1),
         ("torque gain ±1–3 %, known weight", 1),
     }
-    said = (
-        "**First moments without a tare** ({:.0f} %). It is so: of the other logs {:.0f} % are covered, too ({} of {}; "
-    )
-    said += "{:.0f} to {:.0f} % if each log counts as one answer), and {:.0f} % of the masses."
+    said = "**First moments without a tare** ({:.0f} %). It is nearly so: of {} other logs (seeds {}) {:.0f} % "
+    said += "are covered ({} of {}; {:.0f} to {:.0f} % if each log counts as one answer), and {:.0f} % of the masses."
     other = again["nothing, no tare"]["all"]
+    logs, seeds = other["logs"], ", ".join(map(str, again["nothing, no tare"]["seeds"]))
     moments, mass = other["first moments"], other["mass"]["share"]
     seen, of = moments["covered or said"]
     low, high = moments["by log"]
     share = moments["share"]
-    assert (
-        said.format(100 * bare["nothing, no tare"][1], 100 * share, seen, of, 100 * low, 100 * high, 100 * mass) in page
-    )
+    was = 100 * bare["nothing, no tare"][1]
+    assert said.format(was, logs, seeds, 100 * share, seen, of, 100 * low, 100 * high, 100 * mass) in page
     pair = "nothing, arms beyond", "torque gain ±1–3 %, known weight"
     was = [100 * bare[name][1] for name in pair]
     assert (
