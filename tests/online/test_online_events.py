@@ -545,11 +545,16 @@ def test_nothing_is_noticed_where_nothing_changes(payload):
     assert events == []
 
 
-def test_a_slow_drift_of_the_torque_is_no_change():
+def test_a_slow_drift_of_the_torque_is_no_change_and_its_samples_are_used():
     log = stream(5, [], 14.0, 100.0)
     drift = np.outer(log.t / 20.0, 5e-3 * arm("panda").limits.effort)  # 0.4 N·m in 20 s on the large joints
-    _, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
+    estimates, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
     assert events == []
+    drifting = [e for e in estimates if e.p_drift > 0.5]
+    assert drifting
+    assert max(e.age for e in drifting) < 0.05
+    assert not any("left out" in note for e in drifting for note in e.notes)
+    assert not any(e.interval == "calibrated" for e in drifting)
 
 
 DOWN = pytest.param((0.0, 0.0, -40.0), marks=pytest.mark.full)
