@@ -474,6 +474,53 @@ def test_what_was_taken_for_an_earlier_payload_is_corrected_and_no_new_change(mo
     assert covers(estimates[-1], other.phi)[0]
 
 
+def young_run(std, seconds=1.0, step=0.4):
+    """Runs, of which the present one has lasted so long and knows its mass so well; its mass differs by `step` [kg]."""
+    stream = SimpleNamespace(seconds=seconds, stands=False)
+    return SimpleNamespace(
+        current=SimpleNamespace(stream=stream, last=SimpleNamespace(std=[std])),
+        unit=1.0,
+        is_earlier=lambda: False,
+        mass_step=lambda *_: step,
+    )
+
+
+def changed(naming, rest=False):
+    naming.begin(5.0, 4.9, None, rest=rest)
+    naming.judging = True  # the run after it begins
+
+
+def test_what_a_change_was_is_said_by_an_answer_of_the_run_after_it_and_by_none_before():
+    naming = Naming()
+    changed(naming)
+    assert not naming.judge(young_run(0.01, seconds=7.0), held=None)
+    assert (naming.event.kind, naming.judging) == ("change", True)
+    naming.judge(young_run(0.01, seconds=7.01), held=True)
+    assert (naming.event.kind, naming.event.mass, naming.judging) == ("grasp", 0.4, False)
+
+
+def test_a_change_that_has_its_name_gets_its_mass_once_that_is_known():
+    naming = Naming()
+    changed(naming)
+    naming.judge(young_run(0.3, seconds=1.6, step=None), held=True)
+    assert (naming.event.kind, naming.event.mass) == ("grasp", None)
+    naming.judge(young_run(0.3, seconds=8.0, step=None), held=True)
+    assert naming.judging
+    naming.judge(young_run(0.05, seconds=9.0), held=False)
+    assert (naming.event.kind, naming.event.mass, naming.judging) == ("grasp", 0.4, False)
+
+
+def test_a_change_that_seemed_to_go_on_and_did_not_still_gets_its_name():
+    naming = Naming()
+    changed(naming)
+    naming.judge(young_run(0.2, seconds=0.3), held=False)
+    naming.begin(5.5, 5.4, None, rest=True)
+    naming.call_off(young_run(0.2, seconds=0.4))
+    assert naming.judging
+    naming.judge(young_run(0.01), held=True)
+    assert naming.event.kind == "grasp"
+
+
 @pytest.mark.parametrize(
     ("t", "step", "corrected"), [(8.0, 0.015, True), (8.0, -0.015, True), (8.0, 0.03, False), (18.0, 0.015, False)]
 )
@@ -498,11 +545,16 @@ def test_nothing_is_noticed_where_nothing_changes(payload):
     assert events == []
 
 
-def test_a_slow_drift_of_the_torque_is_no_change():
+def test_a_slow_drift_of_the_torque_is_no_change_and_its_samples_are_used():
     log = stream(5, [], 14.0, 100.0)
     drift = np.outer(log.t / 20.0, 5e-3 * arm("panda").limits.effort)  # 0.4 N·m in 20 s on the large joints
-    _, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
+    estimates, events = said(Recording(log.t, log.q, log.dq, log.tau + drift), "map-gp")
     assert events == []
+    drifting = [e for e in estimates if e.p_drift > 0.5]
+    assert drifting
+    assert max(e.age for e in drifting) < 0.05
+    assert not any("left out" in note for e in drifting for note in e.notes)
+    assert not any(e.interval == "calibrated" for e in drifting)
 
 
 DOWN = pytest.param((0.0, 0.0, -40.0), marks=pytest.mark.full)
@@ -538,6 +590,15 @@ def test_a_constant_push_is_not_taken_for_a_drift_of_the_arm(seed, force):
     assert not any(e.interval == "calibrated" for e in during)
     assert not estimates[-1].held
     assert covers(estimates[-1], 0.0)[:4].all()
+
+
+def test_a_payload_that_was_not_exchanged_after_all_is_held_since_it_was_taken_up():
+    log = stream(6, [(3.0, HALF_KILO)], 7.5)
+    size = np.sin(np.pi * np.clip(log.t - 6.0, 0.0, 1.0)) ** 2  # a weight, to begin with
+    estimates, events = said(pushed(log, (0.0, 0.0, -20.0), size), "map-gp")
+    assert [(event.kind, round(event.t)) for event in events] == [("grasp", 3), ("return", 6)]
+    assert max(e.since for e in estimates) == events[1].t  # while it seems to be another one
+    assert estimates[-1].since == events[0].t
 
 
 @pytest.mark.full  # some seconds

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from armload.arms import Arm
 from armload.identification.arm_notes import arm_changed, held_against, leaning
 from armload.identification.reporting import doubt_of
 from armload.posterior import PosteriorLeastSquares
-from armload.posterior.restless import PERIOD
+from armload.posterior.restless import PERIOD, SHOWN
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 
 
@@ -36,6 +38,8 @@ class Doubts:
         self._torque = "link"  # when gravity was asked
         self._than = "tare"  # what the arm is not as, as of `arm_changed`
         self._looked: tuple[int, int, bool, str] | None = None
+        self._run: PosteriorLeastSquares | None = None
+        self._restless = np.inf  # of the run, the least so far once it is long
         self.arm_changed: str | None = None
         self.sentences: tuple[str, ...] = ()
 
@@ -45,6 +49,8 @@ class Doubts:
         now = id(stream), stream.solutions, stream.seconds >= PERIOD, relative_to
         if now == self._looked:
             return
+        if run is not self._run:
+            self._run, self._restless = run, np.inf
         self._looked, torque = now, stream.posterior.torque
         if stream.another is not None:
             self.asked_whose = True
@@ -56,6 +62,13 @@ class Doubts:
         if self.arm_changed is None:
             self._than = held_against(run.profile is not None, relative_to == "tare")
         self.arm_changed = arm_changed(self._drift, self.another, self._than)
-        restless = stream.restlessness if stream.seconds >= PERIOD else 0.0
-        doubts = doubt_of(False, True, self.arm_changed, restless), leaning(self._arm, self._tilt, torque)
+        moves = doubt_of(False, True, self.arm_changed, self._restlessness(run))
+        doubts = moves, leaning(self._arm, self._tilt, torque)
         self.sentences = tuple(doubt for doubt in doubts if doubt is not None)
+
+    def _restlessness(self, run: PosteriorLeastSquares) -> float:
+        """Of a run, as far as it says that what is held moves; a long one that was not restless does not become so."""
+        stream = run.stream
+        now = stream.restlessness if stream.seconds >= PERIOD else 0.0
+        self._restless = min(self._restless, now) if stream.seconds > SHOWN else now
+        return self._restless

@@ -42,7 +42,8 @@ class Naming:
     """The last change noticed, and whether the run after it is still judged.
 
     Attributes:
-        event: the last change. judging: whether the run is new, and may give way to the earlier one.
+        event: the last change. judging: whether the run after it is asked: it may give way to the earlier one, or what
+            the change was is not all known.
         held_before: whether anything was held before the change, or the doubt.
     """
 
@@ -50,6 +51,8 @@ class Naming:
         self.event: Event | None = None
         self.judging = self._unnamed = self.held_before = self._held = self._rest = self._recognised = False
         self._ended: PosteriorLeastSquares | None = None
+        self._may_return = False  # whether the run is still so new that it may hold what the earlier one held
+        self._before = False, False, False  # all three of the last change, before what may be its rest
 
     def corrects_the_recognition(self, t: float, step: float) -> bool:
         """Whether a step of the mass [payloads] at t [s] tells that the run was recognised wrongly, as it is as small.
@@ -67,7 +70,8 @@ class Naming:
             t, began: as of `Event`. run: that ends. rest: it is that of the last change, which went on in this run, or
                 after which the run was recognised wrongly.
         """
-        self.judging = self._recognised = False
+        self._before = self.judging, self._unnamed, self._may_return
+        self.judging, self._recognised, self._may_return = False, False, True
         self._rest, self._unnamed = rest and self.event is not None, True
         if self.event is not None and self._rest:
             self.event = replace(self.event, mass=None)
@@ -77,22 +81,33 @@ class Naming:
     def call_off(self, runs: Runs) -> None:
         """It was none, or the last change did not go on: the payload is what it was."""
         assert self.event is not None
-        kind, mass = (self.event.kind, runs.mass_step(self._ended)) if self._rest else ("return", 0.0)
-        self._name(kind, mass)
+        if self._rest:
+            self.judging, self._unnamed, self._may_return = self._before
+            self._name(self.event.kind, runs.mass_step(self._ended))
+        else:
+            self._name("return", 0.0)
 
-    def judge(self, runs: Runs, held: bool) -> bool:
-        """Say what the change was once the new run can tell; whether that holds what the earlier run held."""
+    def judge(self, runs: Runs, held: bool | None) -> bool:
+        """Say what the change was once the new run can tell; whether that holds what the earlier run held.
+
+        held: whether anything is, by an answer of the new run; None: it has given none yet.
+        """
+        assert self.event is not None
         stream, std = runs.current.stream, float(runs.current.last.std[0]) / runs.unit
         if stream.seconds < KIND_FROM:
             return False
-        self.judging = stream.seconds <= RETURN_UNTIL
-        if runs.is_earlier():
+        if self._may_return and runs.is_earlier():
             self.judging, self._recognised = False, True
             self._name("return", runs.mass_step(self._ended, runs.earlier))
             return True
-        if self._unnamed and (std <= KIND_STD or stream.seconds > KIND_LATEST or stream.stands):
+        self._may_return = stream.seconds <= RETURN_UNTIL
+        tells = std <= KIND_STD or stream.seconds > KIND_LATEST or stream.stands
+        if self._unnamed and held is not None and tells:
             self._unnamed = False
             self._name(_KINDS[self._held, held], runs.mass_step(self._ended))
+        elif not self._unnamed and self.event.mass is None and (mass := runs.mass_step(self._ended)) is not None:
+            self._name(self.event.kind, mass)
+        self.judging = self._may_return or self._unnamed or self.event.mass is None
         return False
 
     def _name(self, kind: str, mass: float | None) -> None:

@@ -127,6 +127,7 @@ class OnlineIdentifier:
         self._stream.reset()
         self._published = -math.inf
         self._since: float | None = None
+        self._since_before: float | None = None  # the same before the last change
         self._blind = False  # whether a change of payload would not be seen now
         self._seen = Seen()
         self.event: Event | None = None
@@ -252,9 +253,9 @@ class OnlineIdentifier:
     def _identify(self, sample: Sample, watch: PayloadWatch) -> None:
         judgement, event, run = self._judgement, watch.event, watch.run
         run.publish = self._every if run.stream.seconds > KIND_LATEST else PUBLISH
-        estimate = watch.update(sample, judgement.held)
+        estimate = watch.update(sample, judgement.held, judgement.run)
         if watch.event is not event and watch.event is not None:
-            self._noticed(watch.event, watch.settling, self._stream.clock - sample.t)
+            self._noticed(watch.event, watch, self._stream.clock - sample.t)
         if estimate is None:
             if sample.t - self._published > PUBLISH:
                 self._track(watch, sample)
@@ -286,11 +287,13 @@ class OnlineIdentifier:
         self._judge(estimate, watch.run)
         self._judgement.left_out(watch)
 
-    def _noticed(self, event: Event, settling: bool, shift: float) -> None:
+    def _noticed(self, event: Event, watch: PayloadWatch, shift: float) -> None:
         """A change of payload, or what it was; the stream's clock is ahead of its by `shift` [s]."""
-        if settling:
-            self._since, self._published = self._stream.clock, -math.inf
+        if watch.settling:
+            self._since_before, self._since, self._published = self._since, self._stream.clock, -math.inf
             self._stream.forget_pauses()
+        elif watch.called_off:  # it was none
+            self._since = self._since_before
         if self._event_t != event.t:  # the same event keeps its time, however long a pause there was since
             self._event_t, self._event_shift = event.t, shift
         self.event = replace(event, t=event.t + self._event_shift, began=event.began + self._event_shift)

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armload.estimators import Estimate
+from armload.estimators import Estimate, Identifier
 from armload.online.change import Change, next_run
 from armload.online.event import Event, Naming
 from armload.online.lasting import Lasting
@@ -43,7 +43,8 @@ class PayloadWatch:
 
     Attributes:
         runs: those that are kept. answered: the run that the last estimate is of. mixed: whether an interval of the run
-            alone would leave out more than its 5 %, as the payload may have changed.
+            alone would leave out more than its 5 %, as the payload may have changed. called_off: whether the last
+            change that settled was none.
     """
 
     def __init__(self, first: PosteriorLeastSquares) -> None:
@@ -66,7 +67,7 @@ class PayloadWatch:
         self._weighing.reset(self.run)
         self._doubted_at: float | None = None  # doubting, since then [s]
         self._gave_up = False  # following: what does not fit is believed until it fits again
-        self._change = None
+        self._change, self.called_off = None, False
 
     @property
     def run(self) -> PosteriorLeastSquares:
@@ -120,8 +121,11 @@ class PayloadWatch:
         phi, covariance = self._tracker.track(self._weighing.modes, self._weighing.row_t, (last.phi, last.covariance))
         return replace(last, t=t, phi=phi, covariance=covariance)
 
-    def update(self, sample: Sample, held: bool) -> Estimate | None:
-        """Take one sample; None while it does not count. `held`: whether anything was, by the last estimate."""
+    def update(self, sample: Sample, held: bool, by: Identifier | None) -> Estimate | None:
+        """Take one sample; None while it does not count.
+
+        held: whether anything was, by the last estimate. by: the run that this was of; None: of none alone.
+        """
         if self._change is not None:
             self._settle(self._change, sample)
             return None
@@ -133,7 +137,7 @@ class PayloadWatch:
             self._examine(sample, held)
             if not self._following:
                 return None
-        return self._follow(sample, held)
+        return self._follow(sample, held, by)
 
     def conclude(self) -> Estimate:
         """The estimate of the current run after a last solution, and of a hand-over that may go on in it."""
@@ -145,7 +149,7 @@ class PayloadWatch:
 
     # ------------------------------------------------------------------ following
 
-    def _follow(self, sample: Sample, held: bool) -> Estimate:
+    def _follow(self, sample: Sample, held: bool, by: Identifier | None) -> Estimate:
         run = self.answered = self.runs.current
         before, estimate = run.stream.rows, run.update(sample)
         if run.stream.rows > before and self._look.row(sample.t):
@@ -153,7 +157,7 @@ class PayloadWatch:
         self._look.seen(sample.t)
         if run.fresh and self._weighing.steady > LIKELY:
             self.runs.note_steady()
-        if run.fresh and self._naming.judging and self._naming.judge(self.runs, held):
+        if run.fresh and self._naming.judging and self._naming.judge(self.runs, held if by is run else None):
             self._watch_anew(self.runs.go_back())
         return estimate
 
@@ -194,7 +198,7 @@ class PayloadWatch:
         self._naming.begin(sample.t, began, run, self._tracker.rest(shift) or corrects(sample.t, step))
         next_about = run, self.runs.reference_for_next(), until, self._weighing.sticks
         following = self._background.submit(next_run, *next_about)
-        self._change, self._doubted_at = Change(sample.t, began, state, following), None
+        self._change, self._doubted_at, self.called_off = Change(sample.t, began, state, following), None, False
 
     def _settle(self, change: Change, sample: Sample) -> None:
         """A sample while the payload may go on changing; then the next run begins, or the run before goes on."""
@@ -213,7 +217,7 @@ class PayloadWatch:
         """The payload is what it was: the run before goes on."""
         self._background.submit(change.run.close)
         self._naming.call_off(self.runs)
-        self._change, self._doubted_at, self._gave_up = None, change.t, False
+        self._change, self._doubted_at, self._gave_up, self.called_off = None, change.t, False, True
 
     def _take_up_the_next(self, change: Change) -> None:
         """The payload stays: the next run begins."""
