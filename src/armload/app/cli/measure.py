@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from armload.arms import Arm
     from armload.devices import Mover
+    from armload.excitation import Constraints
     from armload.inertia import InertialParameters
     from armload.measuring import Measurement, Plan
     from armload.motion import Motion
@@ -70,10 +71,11 @@ def run(options: argparse.Namespace) -> int | None:
     check_tare_age(options)
     _, tare = read_logs(options, arm, None, options.tare)
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
-    simulated = {} if options.source != "sim" else _simulated(options, arm, motion, loaded=tare is not None)
+    heaviest = Basis(**known).heaviest
+    simulated = {} if options.source != "sim" else _simulated(options, arm, motion, heaviest, loaded=tare is not None)
     with ended_by_sigterm(), open_mover(options.source, arm, **simulated) as mover:
         if motion is None:
-            motion = _designed(arm, mover.commanded(), profile, Basis(**known).heaviest, options)
+            motion = _designed(arm, mover.commanded(), profile, heaviest, options)
         if options.apply and not mover.writes:
             raise UsageError(f"{mover.name} takes no payload: leave out --apply, and export the answer")
         procedure = Procedure(
@@ -151,18 +153,24 @@ def _designed(
     arm: Arm, pose: NDArray, profile: Profile | None, mass: float | None, options: argparse.Namespace
 ) -> Motion:
     """The motion about the present pose that tells most, for who named none: after an empty run of it, or a tare."""
-    from armload.excitation import Constraints, Criterion, PayloadRange, design_motion
+    from armload.excitation import Criterion, design_motion
 
-    heaviest = None if mass is None else PayloadRange(mass)
-    around = surroundings_of(options, arm)
     try:
-        limits = Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
+        limits = _allowed(arm, pose, mass, options)
         with working("designing a motion about the present pose"):
             return design_motion(limits, Criterion(arm, "same", profile), options.time, name="designed").motion
     except MotionError as error:
         if "larger share" not in str(error):
             raise
         raise MotionError(f"{error}; one with a larger share `armload motion design` makes, for --motion") from None
+
+
+def _allowed(arm: Arm, pose: NDArray, mass: float | None, options: argparse.Namespace) -> Constraints:
+    """What a motion about a pose is to keep to, with up to so much [kg] held; None: what the arm is rated for."""
+    from armload.excitation import Constraints, PayloadRange
+
+    heaviest, around = None if mass is None else PayloadRange(mass), surroundings_of(options, arm)
+    return Constraints(arm, pose, payload=heaviest, surroundings=around, speed=options.tool_speed)
 
 
 def _consent(options: argparse.Namespace) -> Callable[[Plan], bool]:
@@ -248,13 +256,20 @@ def _apply(found: Measurement, mover: Mover, mounted: Any, options: argparse.Nam
         raise SinkError(failed)
 
 
-def _simulated(options: argparse.Namespace, arm: Arm, motion: Motion | None, loaded: bool) -> dict[str, Any]:
+def _simulated(
+    options: argparse.Namespace, arm: Arm, motion: Motion | None, mass: float | None, loaded: bool
+) -> dict[str, Any]:
+    from armload.excitation.start import pose_to_begin_at
+
     if options.at is not None and len(options.at) != arm.n:
         raise UsageError(f"--at has {len(options.at)} joint positions: {arm.name} has {arm.n}; give {arm.n}, in rad")
-    payload = payload_of(options.payload, arm)
-    stands = arm.limits.middle if motion is None else motion.position([0.0])[0]
+    payload, at = payload_of(options.payload, arm), options.at
+    if at is None and motion is not None:
+        at = motion.position([0.0])[0]
+    elif at is None:
+        at = pose_to_begin_at(arm, lambda pose: _allowed(arm, pose, mass, options), options.floor)
     return {
-        "at": stands if options.at is None else options.at,
+        "at": at,
         "payload": payload,
         "mounted": payload if loaded else None,
         "world": world_of(options.world, arm),

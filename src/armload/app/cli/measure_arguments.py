@@ -134,7 +134,7 @@ def parser() -> Parser:
         "--at",
         type=numbers,
         metavar="Q1,…",
-        help="where it stands [rad] (default: where the motion begins, else the middle of the joints)",
+        help="where it stands [rad] (default: where the motion begins, else near the middle of the joints)",
     )
     sim("--speed", type=_speed, default=1.0, metavar="X|max", help="1: real time")
     sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
