@@ -1,6 +1,6 @@
 """What a stream and a log say of an arm that goes from pose to pose for minutes, each another, with one payload.
 
-    python benchmarks/ever_new_poses.py [--arms 6] [--seconds 600] [--pushed 12] [--jobs 1]
+    python benchmarks/ever_new_poses.py [--arms 6] [--seconds 600] [--pushed 12] [--jobs 1] [--page]
 
 Real-like Pandas (`World.real_like`, the sensors as measured) at 100 Hz that go from one pose to the next and stop
 there, each pose another: *in one place*, 0.6 to 1.8 rad about a pose at most (`MotionSource.stops`), or *everywhere*,
@@ -15,18 +15,20 @@ each:
   any direction. A push counts as called a change if an event falls into it or the second after it; by its last name it
   stays one or is a `return`.
 
-Printed, and written to benchmarks/results/ever_new_poses.json and a table of docs/online_measured.md.
+Printed, and written to benchmarks/results/ever_new_poses.json and a table of docs/online_measured.md; --page: the table
+only, of what was measured.
 """
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from alarms import wilson
 from event_scenes import Push, body
-from script import ROOT, markdown_table, options, say, write, write_table
+from script import RESULTS, ROOT, markdown_table, options, say, write, write_table
 
 from armload import Recording, arm, identify
 from armload.inertia import InertialParameters
@@ -157,20 +159,18 @@ def table(found: dict[str, Any]) -> str:
             doubted, inside = (sum(not x[k] for x in of) for k in ("calibrated", "inside"))
             error = 1e3 * np.mean([abs(x["error"]) for x in of])
             logs.append([f"{where}, {part} s", str(len(of)), str(doubted), str(inside), f"{error:.1f} g"])
-    heads = [
-        "poses",
-        "false in the first 100 s",
-        "false after them",
-        "restlessness at most",
-        "doubted",
-        "pushes called",
-    ]
-    streams = markdown_table(heads, "rrrrr", rows)
-    return f"{streams}\n\n" + markdown_table(["log", "number", "not calibrated", "mass outside", "error"], "rrrr", logs)
+    heads = ["poses", "false in the first 100 s", "false after them", "restlessness", "doubted", "pushes: called, kept"]
+    streams = markdown_table(heads, "lrrrrr", rows)
+    heads = ["log", "number", "not called calibrated", "mass outside", "mass error"]
+    return f"{streams}\n\n" + markdown_table(heads, "lrrrr", logs)
 
 
 def main() -> None:
-    asked = options(__doc__, arms=6, seconds=600.0, pushed=12, jobs=1)
+    asked = options(__doc__, arms=6, seconds=600.0, pushed=12, jobs=1, page=False)
+    if asked.page:
+        found = json.loads((RESULTS / "ever_new_poses.json").read_text(encoding="utf-8"))
+        write_table(PAGE, "ever new poses", table(found))
+        return
     rooms = (ROOT / "src" / "armload" / room for room in ("online", "posterior", "regression", "identification"))
     code, tasks = source_key(*rooms, Path(__file__)), []
     for number, where in enumerate(WHERE):
@@ -183,7 +183,7 @@ def main() -> None:
                 name = f"{where} {kind} {seed}"
                 tasks.append(Task.of_one(name, key_of(code, name, *more), task, seed, where, *more))
     cells = run_tasks(tasks, ROOT / "out" / "ever_new_poses", jobs=asked.jobs, say=say)
-    found: dict[str, Any] = {"seconds": asked.seconds}
+    found = {"seconds": asked.seconds}
     for where in WHERE:
         of = {k: [c for name, c in cells.items() if name.startswith(f"{where} {k}")] for k in ("quiet", "pushed")}
         n, called, kept = (sum(one[key] for one in of["pushed"]) for key in ("pushes", "called", "kept"))

@@ -432,6 +432,36 @@ def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
     assert f"the median delay of a step is {parts['steps']['delay_s']['50 %']:.2f} s." in words
 
 
+def test_what_is_said_of_arms_that_go_to_ever_new_poses_is_what_was_measured(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from ever_new_poses import table
+
+    found, page = result_of("ever_new_poses"), words_of("online_measured")
+    assert table(found) in (ROOT / "docs" / "online_measured.md").read_text(encoding="utf-8")
+    place, wide = (found[where]["quiet"] for where in ("in one place", "everywhere"))
+    logs = [[log for arm in arms for log in arm["logs"].values()] for arms in (place, wide)]
+    assert not any(arm["events"] for arm in place)
+    assert all(log["calibrated"] and log["inside"] for log in logs[0])
+    events = [event for arm in wide for event in arm["events"]]
+    assert len(events) == 7
+    assert all(abs(event["mass"]) < 0.1 for event in events)
+    assert len(wide) * found["seconds"] == 3600.0
+    doubted = sum(not log["calibrated"] for log in logs[1])
+    assert f"seven false events in an hour, all of less than 0.1 kg, and {doubted} of {len(logs[1])} logs" in page
+    outside = [(k, name) for k, arm in enumerate(wide) for name, log in arm["logs"].items() if not log["inside"]]
+    assert len(outside) == 2
+    assert {name for _, name in outside} == {"300", "600"}
+    (arm,) = {k for k, _ in outside}
+    errors = [wide[arm]["logs"][name]["error"] for name in ("300", "600")]
+    assert all(abs(abs(error) - 0.05) < 0.005 for error in errors)
+    assert all(wide[arm]["logs"][name]["calibrated"] for name in ("300", "600"))
+    pushes = [found[where]["of pushes"] for where in ("in one place", "everywhere")]
+    assert sum(of["called"] for of in pushes) == 4
+    assert f"of {sum(of['pushes'] for of in pushes)} light ones" in words_of("online")
+    early = [value for arms in (place, wide) for arm in arms for at, value in arm["restlessness"].items()]
+    assert max(early) == max(arm["restlessness"]["600"] for arm in wide)
+
+
 def test_the_short_table_of_streams_is_that_of_the_committed_benchmark():
     parts = json.loads((RESULTS / "events.json").read_text())["parts"]
     page = " ".join((ROOT / "docs" / "online.md").read_text(encoding="utf-8").split())
