@@ -13,6 +13,7 @@ from armload.estimators import Identifier
 from armload.identification.methods import METHODS
 from armload.posterior import PosteriorLeastSquares, Profile
 from armload.recording import Recording
+from armload.regression import JointFeatures
 
 DEFAULT = "hybrid"  # the method where nothing is named and the arm has a trained model
 _ELSEWHERE = "map-gp"
@@ -42,6 +43,7 @@ def choose(
     *,
     live: bool = False,
     profile: Profile | None = None,
+    features: JointFeatures | None = None,
 ) -> Choice:
     """The method for a log or a live stream.
 
@@ -50,6 +52,7 @@ def choose(
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
         live: for a stream, where no motion is known beforehand.
         profile: what was learned of this arm from many logs.
+        features: of the arm's smooth mismatch, of a method that has it as an unknown; None: the usual ones.
 
     Raises:
         ArmloadError: an unknown method, a model that is missing or of another arm, or a tare the method has no use for.
@@ -59,13 +62,20 @@ def choose(
             f"the method is {method!r}: expected a name or a model's file; an identifier of your own answers by "
             "its run(recording), and armload.lab.evaluation.compare sets it beside others"
         )
-    choice = _chosen(arm, tare, default_for(arm) if method is None else str(method), live, profile)
+    choice = _chosen(arm, tare, default_for(arm) if method is None else str(method), live, profile, features)
     if live and isinstance(choice.identifier, PosteriorLeastSquares):
         choice.identifier.live = True
     return choice
 
 
-def _chosen(arm: Arm, tare: Recording | None, name: str, live: bool, profile: Profile | None) -> Choice:
+def _chosen(
+    arm: Arm,
+    tare: Recording | None,
+    name: str,
+    live: bool,
+    profile: Profile | None,
+    features: JointFeatures | None,
+) -> Choice:
     entry = METHODS.get(name)
     if entry is not None and not (Path(name).is_file() and entry.needs == "training"):
         if live and name not in LIVE:
@@ -73,15 +83,17 @@ def _chosen(arm: Arm, tare: Recording | None, name: str, live: bool, profile: Pr
                 f"the method {name} cannot follow a live stream: expected one of {', '.join(LIVE)}, or the file of a "
                 "trained model"
             )
-        return Choice(name, entry.make(arm, tare, profile))
-    return _trained(arm, tare, model_file(name, LIVE if live else tuple(METHODS)), profile)
+        return Choice(name, entry.make(arm, tare, profile, features))
+    return _trained(arm, tare, model_file(name, LIVE if live else tuple(METHODS)), profile, features)
 
 
-def _trained(arm: Arm, tare: Recording | None, file: Path, profile: Profile | None) -> Choice:
+def _trained(
+    arm: Arm, tare: Recording | None, file: Path, profile: Profile | None, features: JointFeatures | None
+) -> Choice:
     from armload.posterior import HybridIdentifier, HybridModel
 
     if HybridModel.wrote(file):
-        made = HybridIdentifier(arm, tare, HybridModel.load(file), profile=profile)
+        made = HybridIdentifier(arm, tare, HybridModel.load(file), features, profile)
         return Choice(made.name, made, str(file))
     from armload.ensembles import LearnedIdentifier, load_model
 

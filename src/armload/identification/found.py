@@ -24,7 +24,7 @@ from armload.posterior.restless import most_restless
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import TURNED, TURNS
 from armload.recording import Recording, span
-from armload.regression import payload_prior_std
+from armload.regression import JointFeatures, payload_prior_std
 
 # [squared expected deviations, summed over links] that no sound arm with joint torque sensors shows: the 99 % point of
 # chi-squared for a Panda's 70 link parameters, of which a log tells a part. Simulated ones as measured reach 13 (60
@@ -39,12 +39,18 @@ class Asked:
 
     method: as of `identify`. drift: by how many daily deviations the arm may differ from what it was at its tare.
     known: what is known of the payload apart from the log. profile: what was learned of the arm from many logs.
+    features: of the arm's smooth mismatch, without a profile; None: the usual ones.
     """
 
     method: str | Path | None = None
     drift: float = 0.0
     known: Known | None = None
     profile: Profile | None = None
+    features: JointFeatures | None = None
+
+    def method_for(self, arm: Arm, tare: Recording | None) -> Choice:
+        """The method, made ready for an arm and a tare."""
+        return choose(arm, tare, self.method, profile=self.profile, features=self.features)
 
 
 class Found(NamedTuple):
@@ -153,10 +159,10 @@ def found_in(recording: Recording, arm: Arm, tare: Recording | None, asked: Aske
 
 def _found_on_side(recording: Recording, arm: Arm, tare: Recording | None, asked: Asked) -> Found:
     """The same, whichever side of the gears the torque is measured on."""
-    found = _found(choose(arm, tare, asked.method, profile=asked.profile), arm, recording, asked)
+    found = _found(asked.method_for(arm, tare), arm, recording, asked)
     if found.unknown_friction:
         motor_side = replace(arm, motor_torque=True)
-        found = _found(choose(motor_side, tare, asked.method, profile=asked.profile), motor_side, recording, asked)
+        found = _found(asked.method_for(motor_side, tare), motor_side, recording, asked)
         found = found._replace(friction_found=True)
     return found._replace(arm_known=held_against(asked.profile is not None, tare is not None))
 

@@ -18,9 +18,11 @@ from armload.identification.answer import Identification, Segment
 from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.found import Asked, found_in
 from armload.identification.known_options import families
+from armload.identification.many_poses import more_features
 from armload.identification.mounting import likelier_gravity, mounted_otherwise
 from armload.identification.notes import (
     ALLOWED,
+    MANY_POSES,
     MAY_CHANGE,
     MOTOR_PROFILE,
     UNCHECKED,
@@ -116,10 +118,11 @@ def identify(
     mounted = read_payload(tool) if isinstance(tool, str | Path) else tool
     say("identifying")
     question = Question(tare, mounted, asked, notes)
-    account = _account(recording, arm, question)
+    account, question = _of_all_poses(recording, arm, question, say)
     if (account.doubts or account.left > 1.0) and not arm.motor_torque:
         say("asking whether noise of the velocities, or friction that grows with the load, would explain it")
-        calmer = replace(question, tare=None if tare is None else steadied(tare), notes=(*notes, ALLOWED))
+        steady = None if tare is None else steadied(tare)
+        calmer = replace(question, tare=steady, notes=(*question.notes, ALLOWED))
         other = _account(steadied(recording), replace(arm, gear_loss=LINK_LOSS), calmer)
         if not other.doubts and other.left <= EXPLAINS * max(account.left, 1.0):
             account = other
@@ -148,13 +151,27 @@ class _Account(NamedTuple):
     left: float
 
 
+def _of_all_poses(
+    recording: Recording, arm: Arm, question: Question, say: Callable[[str], None]
+) -> tuple[_Account, Question]:
+    """The account of a log, with more functions of the pose where fewer raise a doubt as there are very many poses."""
+    account, asked = _account(recording, arm, question), question.asked
+    features = more_features(recording, arm) if account.doubts and asked.profile is None else None
+    if features is None:
+        return account, question
+    say("asking whether more functions of the pose would explain it, as the log is of very many poses")
+    finer = replace(question, asked=replace(asked, features=features), notes=(*question.notes, MANY_POSES))
+    other = _account(recording, arm, finer)
+    return (other, finer) if other.doubts < account.doubts else (account, question)
+
+
 def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
     """The answer for a log, part by part where the payload changes within it."""
     whole = answer_of_one_payload(recording, arm, question)
     of_arm = (None, None) if whole.another else (question.tare, question.asked.profile)
     # a base that leans looks like a payload that changes
     level = arm if whole.gravity is None else replace(arm, gravity=whole.gravity)
-    changes = changes_of_payload(recording, level, *of_arm, whole.kappa, whole.mass)
+    changes = changes_of_payload(recording, level, *of_arm, whole.kappa, whole.mass, question.asked.features)
     times = changes.times
     edges, answers = [recording.t[0], *times, recording.t[-1]], [whole]
     if times:

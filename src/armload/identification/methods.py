@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from armload.arms import Arm
 from armload.errors import IdentificationError
@@ -30,6 +31,7 @@ from armload.estimators import (
 )
 from armload.posterior import PosteriorLeastSquares, Profile, SmoothPosteriorLeastSquares
 from armload.recording import Recording
+from armload.regression import JointFeatures
 
 TARES = ("own equation", "virtual calibration", "same motion", "none")
 NEEDS = ("", "tare", "training", "motion")
@@ -65,8 +67,16 @@ class Method:
                 f"{self.name}: tare {self.tare!r} and needs {self.needs!r}: expected {TARES} and {NEEDS}"
             )
 
-    def make(self, arm: Arm, tare: Recording | None = None, profile: Profile | None = None) -> Identifier:
+    def make(
+        self,
+        arm: Arm,
+        tare: Recording | None = None,
+        profile: Profile | None = None,
+        features: JointFeatures | None = None,
+    ) -> Identifier:
         """The method for an arm, relative to a tare or a profile where one is given.
+
+        features: of the arm's smooth mismatch, of a method that can use a profile; others have none.
 
         Raises:
             IdentificationError: it needs what was not given, or cannot use the tare or profile that was.
@@ -86,7 +96,10 @@ class Method:
             raise IdentificationError(
                 f"the method {self.name} cannot use a tare: leave the tare out, or use the method map"
             )
-        return self.build(arm, tare) if profile is None else self.build(arm, tare, profile=profile)
+        more: dict[str, Any] = {} if profile is None else {"profile": profile}
+        if features is not None and self.profile:
+            more["features"] = features
+        return self.build(arm, tare, **more)
 
 
 def calibrated(kind: Callable[[Arm], Identifier]) -> Callable[[Arm, Recording | None], Identifier]:
@@ -103,10 +116,12 @@ def _trained(name: str) -> Callable[[Arm, Recording | None], Identifier]:
     return refuse
 
 
-def _hybrid(arm: Arm, tare: Recording | None, profile: Profile | None = None) -> Identifier:
+def _hybrid(
+    arm: Arm, tare: Recording | None, profile: Profile | None = None, features: JointFeatures | None = None
+) -> Identifier:
     from armload.posterior import HybridIdentifier
 
-    return HybridIdentifier(arm, tare, profile=profile)
+    return HybridIdentifier(arm, tare, profile=profile, features=features)
 
 
 def _commanded(*_: object) -> Identifier:

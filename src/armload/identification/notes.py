@@ -52,6 +52,12 @@ ALLOWED = (
 )
 
 
+MANY_POSES = (
+    "the log goes to so many poses that the arm's own error was sought among three times as many functions of the "
+    "pose: with fewer, something looked wrong"
+)
+
+
 UNCHECKED = (
     "the intervals of an answer made so were checked with a tare, and without a profile, only: they may be too narrow; "
     "record a tare"

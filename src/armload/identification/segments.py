@@ -35,6 +35,7 @@ from armload.posterior import Profile, SmoothPosteriorLeastSquares
 from armload.posterior.calibration import KAPPA_UNKNOWN
 from armload.posterior.drift import TESTED
 from armload.recording import Recording
+from armload.regression import JointFeatures
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 from armload.regression.rows_of_log import RowsOfLog
@@ -75,6 +76,7 @@ def changes_of_payload(
     profile: Profile | None = None,
     kappa: float | None = None,
     held: float = 0.0,
+    features: JointFeatures | None = None,
 ) -> Changes:
     """Where the payload changes within a log; no time: it is the same throughout.
 
@@ -83,11 +85,13 @@ def changes_of_payload(
         kappa: by how much the physics overrates the evidence of this log, where it does; None: not known. Not believed
             of motor currents: what a change leaves unexplained is read as the arm's own error, and hides the change.
         held: mass of what seems to be held [kg].
+        features: of the arm's smooth mismatch, without a profile; None: the usual ones.
     """
     kappa = KAPPA_UNKNOWN if kappa is None or arm.motor_torque else max(kappa, 1.0)
-    found = _Search.of(recording, arm, tare, profile, kappa, held).all()
+    found = _Search.of(recording, arm, tare, profile, kappa, held, features).all()
     if found.times and not arm.motor_torque and _rubs(recording, found.times, arm):
-        found = _Search.of(recording, replace(arm, motor_torque=True), tare, profile, KAPPA_UNKNOWN, held).all()
+        motor_side = replace(arm, motor_torque=True)
+        found = _Search.of(recording, motor_side, tare, profile, KAPPA_UNKNOWN, held, features).all()
     return found
 
 
@@ -123,8 +127,9 @@ class _Search:
         profile: Profile | None,
         kappa: float,
         held: float,
+        features: JointFeatures | None,
     ) -> _Search:
-        physics = SmoothPosteriorLeastSquares(arm, tare, profile=profile)
+        physics = SmoothPosteriorLeastSquares(arm, tare, profile=profile, features=features)
         if profile is None:
             physics.allow_for(TESTED)  # with more, as of an old tare, the same is found
         return cls(Cuts(physics, RowsOfLog(physics.stream.regression(), recording), kappa, held))

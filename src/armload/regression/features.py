@@ -112,3 +112,18 @@ def features_of_sample(q, dq, waves, velocity_waves):  # pragma: no cover - comp
             velocity[j, i] = np.cos(angle) / np.sqrt(few)
             velocity[j, few + i] = np.sin(angle) / np.sqrt(few)
     return pose, velocity
+
+
+def distinct_poses(q: NDArray[np.float64]) -> float:
+    """How many poses of N (N, n) [rad, m] an arm's smooth mismatch tells apart: N²/Σ_ij k(q_i, q_j)².
+
+    k is the kernel of the functions of the pose, (tr K)²/tr K² of its matrix the number of values that are as good as
+    independent: 1 at rest, N where all are far apart. Source: Rasmussen & Williams 2006, section 2.6 (degrees of
+    freedom of a linear smoother are of the same kind).
+
+    >>> round(distinct_poses(np.zeros((5, 7))), 3), round(distinct_poses(9.0 * np.eye(7)), 3)
+    (1.0, 7.0)
+    """
+    apart = ((q[:, None] - q[None]) ** 2).sum(axis=-1)
+    kernel = np.mean([np.exp(-0.5 * apart / scale**2) for scale in _LENGTH_SCALES], axis=0)
+    return len(q) ** 2 / float((kernel**2).sum())
