@@ -4,9 +4,10 @@
 
 The design is `armload motion design --time 3` with all joints about the pose of `designed_motions.py`, a process of its
 own with everything that it imports. The nudge is `enrich` of the pick and place of 6 s given there (5 mm, 2°), after a
-tare of 20 s elsewhere, in a process that has imported what it needs: what a task that goes on has to pay; and `armload
-motion enrich` of the same as a command. Processor seconds, the least of the repeats: what a busy machine adds is not
-the program's. Writes benchmarks/results/design_time.json and the table in docs/motion.md.
+tare of 20 s elsewhere, `quick` and in a process that has imported what it needs: what a task that goes on has to pay;
+and `armload motion enrich` of the same as a command, which is not quick. Processor seconds, the least of the repeats:
+what a busy machine adds is not the program's. Writes benchmarks/results/design_time.json and the table in
+docs/motion.md.
 """
 
 from __future__ import annotations
@@ -48,12 +49,12 @@ def measured(name: str, folder: Path, repeats: int) -> dict[str, float]:
     heaviest = f"{constraints.payload.mass:g}" if constraints.payload is not None else "1"
     common = ["--robot", name, "--payload", heaviest, "--out", str(folder / "out.json")]
     nudge = ["motion", "enrich", str(folder / "pick.json"), "--tare", str(folder / "tare.json"), *common]
-    enrich(path, constraints, criterion)  # compiles, where that has not been done
+    enrich(path, constraints, criterion, quick=True)  # compiles, where that has not been done
     times: dict[str, list[float]] = {"design": [], "nudge": [], "nudge_command": []}
     for _ in range(repeats):
         times["design"].append(of_command("motion", "design", pose, "--time", "3", *common))
         began = time.process_time()
-        enrich(path, constraints, criterion)
+        enrich(path, constraints, criterion, quick=True)
         times["nudge"].append(time.process_time() - began)
         times["nudge_command"].append(of_command(*nudge, "--travel", "10", "--speed", "3"))
     return {what: round(min(each), 2) for what, each in times.items()}

@@ -105,6 +105,17 @@ def test_a_change_whose_jerk_is_soon_too_large_keeps_most_of_its_room():
     assert 4.5e-3 < found.distance <= 5e-3
 
 
+def test_a_quick_change_that_does_not_pass_is_made_smaller_and_not_looked_for_further():
+    ur, home = arm("ur10e"), np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+    low, high, over = home + np.array([[0.0, 0.15, 0, 0, 0, 0], [-0.4, 0, 0, 0, 0, 0], [-0.8, 0, 0, 0, 0, 0.6]])
+    starts, ends = np.array([0.2, 1.2, 2.3, 3.2, 4.4]), np.array([1.0, 2.0, 3.0, 4.2, 5.8])
+    path = PointToPoint(np.array([home, low, home, high, over, home]), starts, ends, name="pick and place")
+    about = Constraints(ur, home, share=1.0, payload=PayloadRange(6.0), travel=10.0, speed=3.0)
+    quick, found = (enrich(path, about, Criterion(ur, "same"), quick=quick) for quick in (True, False))
+    assert max(quick.used[0].share, found.used[0].share) <= 1.0
+    assert quick.distance < 0.9 * found.distance
+
+
 def test_an_enriched_path_comes_no_nearer_to_what_its_path_is_near(panda, path, allowed):
     """A design may go down to half of what its start has; a path that starts 1 cm above a table may not."""
     t = np.linspace(0.0, path.duration, 2000)
