@@ -33,6 +33,13 @@ def motion(tmp_path):
     return str(tmp_path / "small.json")
 
 
+@pytest.mark.full  # a design takes some seconds
+@pytest.mark.parametrize("robot", ["ur5e", "fr3"])  # whose middle is at the floor, or cannot hold what it is rated for
+def test_a_simulated_arm_is_measured_where_a_motion_may_begin(robot, capsys):
+    assert main(["measure", "sim", "--robot", robot, "--dry-run", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["movements"]) == 2
+
+
 def test_a_dry_run_says_what_would_move_and_makes_nothing(motion, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["measure", "sim", *QUICK, "--motion", motion, "--dry-run"]) == 0

@@ -95,7 +95,7 @@ def test_an_enriched_path_keeps_to_the_limits_and_to_its_file(allowed, enriched,
 
 
 def test_a_change_whose_jerk_is_soon_too_large_keeps_most_of_its_room():
-    """It is looked for further at 100 Hz: made smaller until its jerk passes, it kept three of its five millimetres."""
+    """A change begins at a point that is handed out: amid two, its jerk jumped, and three of five mm were left."""
     ur, home = arm("ur5e"), np.array([0.0, -1.2, 1.5, -1.5, -1.57, 0.0])
     there = home + np.array([0.4, 0.1, -0.1, 0.1, 0.2, 0.3])
     path = PointToPoint(np.array([home, there, home]), np.array([0.2, 1.6]), np.array([1.2, 2.6]), name="carry")
@@ -113,7 +113,8 @@ def test_a_quick_change_that_does_not_pass_is_made_smaller_and_not_looked_for_fu
     about = Constraints(ur, home, share=1.0, payload=PayloadRange(6.0), travel=10.0, speed=3.0)
     quick, found = (enrich(path, about, Criterion(ur, "same"), quick=quick) for quick in (True, False))
     assert max(quick.used[0].share, found.used[0].share) <= 1.0
-    assert quick.distance < 0.9 * found.distance
+    assert quick.distance < 4e-3
+    assert found.distance > 4.8e-3
 
 
 def test_an_enriched_path_comes_no_nearer_to_what_its_path_is_near(panda, path, allowed):

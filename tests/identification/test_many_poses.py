@@ -60,8 +60,12 @@ def test_the_functions_of_the_pose_have_the_kernel_that_poses_are_told_apart_by(
 def test_only_a_log_of_very_many_poses_is_one(panda):
     source = MotionSource(panda)
     motions = [taie2024(), *(random_motion(panda, seed) for seed in range(3))]
-    motions += [source.draw(kind, np.random.default_rng(3), 30.0) for kind in KINDS]
-    assert not any(more_features(of(panda, motion, motion.duration), panda) for motion in motions)
+    motions += [source.draw(kind, np.random.default_rng(seed), 60.0) for kind in KINDS for seed in range(3)]
+    logs = [of(panda, motion, motion.duration) for motion in motions]
+    assert not any(more_features(log, panda) for log in logs)
+    assert min(distinct_poses(log.q[::5]) for log in logs) >= 1.0
+    assert max(distinct_poses(log.q[::5]) for log in logs) < 6.3
+    assert distinct_poses(of(panda, everywhere(panda, SECONDS), SECONDS).q[::5]) > 13.5
     assert more_features(of(panda, everywhere(panda, SECONDS), SECONDS), panda) == JointFeatures(7, 384)
 
 

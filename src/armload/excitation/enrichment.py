@@ -123,7 +123,8 @@ def enrich(
     for iterations, weight in _STAGES:
         x = problem.climb(x, iterations, weight)[0]
     found = [held_back(x)]
-    # of 30 task paths at random 16 used 4.5 mm or more of their 5 without this, and 29 with it: most by their jerk
+    # a UR10e's pick and place keeps four of its 5 mm without this, and 4.9 with it
+    # (test_a_quick_change_that_does_not_pass_is_made_smaller_and_not_looked_for_further)
     if found[0].size < MUCH_SMALLER and not quick:
         found.append(held_back(sampled_at(_POINTS, _NEARER / 2.0).climb(x, *AGAIN)[0]))
     passing = [one for one in found if one.passes]

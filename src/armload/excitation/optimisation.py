@@ -43,7 +43,7 @@ STARTS = 4  # seeded
 STAGES = ((12, 30.0), (30, 200.0), (40, 2000.0))
 # what must be left of a motion's size once it is drawn together: else the design goes on, a fifth longer, with so many
 # iterations, a penalty of such a weight, and a clearance [m] beyond what is kept, as a penalty leaves a millimetre to
-# it. Of 20 requests at random three were drawn together to 0.02, 0.29 and 0.68 of their size, and none afterwards
+# it (test_a_clearance_a_millimetre_short_does_not_cost_most_of_the_motion)
 MUCH_SMALLER = 0.9
 AGAIN, _SPARE = (20, 20_000.0), 0.002
 _SHRINKS, _SHRINK = 60, 0.97  # how often, and by what at least, a motion is drawn together

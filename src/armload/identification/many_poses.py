@@ -16,9 +16,9 @@ from armload.recording import Recording
 from armload.regression import JointFeatures
 from armload.regression.features import distinct_poses
 
-# [poses] beyond which a log is one of many: motions of all kinds in one place have 1 to 6.2, however long, and none of
-# their logs is doubted; those everywhere in the joints' range have 14 or more after a minute, and half of them are
-# (`benchmarks/ever_new_poses.py`, test_only_a_log_of_very_many_poses_is_one)
+# [poses] beyond which a log is one of many: motions of all kinds have 1 to 6.3 in a minute, those everywhere in the
+# joints' range 14 (test_only_a_log_of_very_many_poses_is_one); logs in one place are not doubted, however long
+# (`benchmarks/ever_new_poses.py`)
 _MANY = 8.0
 _LOOKED_AT = 400  # samples of a log, evenly: their kernel is a matrix
 
