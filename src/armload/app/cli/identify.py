@@ -17,7 +17,8 @@ from armload.app.cli.arguments import (
     output_file,
 )
 from armload.app.cli.export import FORMS, write
-from armload.app.cli.named import arm_of, payload_named, read_logs, with_gravity_put_back
+from armload.app.cli.named import arm_of, payload_named
+from armload.app.cli.named_logs import read_logs, with_gravity_put_back
 from armload.app.cli.printing import print_json, print_note, working, write_json
 
 _EXAMPLES = """\

@@ -20,7 +20,8 @@ from armload.app.cli.arguments import (
     file_name,
     output_file,
 )
-from armload.app.cli.named import arm_of, columns_for, columns_of, payload_of, read_logs, robot_of
+from armload.app.cli.named import arm_of, payload_of, robot_of
+from armload.app.cli.named_logs import columns_for, columns_of, read_logs
 from armload.app.cli.outputs import check_output, contents_of
 from armload.app.cli.printing import notes_aside, print_note
 from armload.errors import ArmloadError, IdentificationError, ModelError, UsageError

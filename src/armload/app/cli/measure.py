@@ -12,17 +12,8 @@ from typing import TYPE_CHECKING, Any
 from armload.app.cli.arguments import COLUMN_OPTIONS, check_tare_age
 from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.measure_arguments import parser
-from armload.app.cli.named import (
-    arm_of,
-    boxes_of,
-    motion_of,
-    part_of,
-    payload_of,
-    read_logs,
-    robot_of,
-    surroundings_of,
-    world_of,
-)
+from armload.app.cli.named import arm_of, boxes_of, motion_of, part_of, payload_of, robot_of, surroundings_of, world_of
+from armload.app.cli.named_logs import read_logs
 from armload.app.cli.printing import print_json, print_note, working, write_json
 from armload.errors import MotionError, SafetyError, SentError, SinkError, UsageError
 from armload.runtime.interruption import ended_by_sigterm, held_back

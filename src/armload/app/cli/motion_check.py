@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import add_arm_arguments, add_column_arguments
-from armload.app.cli.named import arm_of, check_columns, motion_of, names_motion, payload_of, read_logs
+from armload.app.cli.named import arm_of, motion_of, names_motion, payload_of
+from armload.app.cli.named_logs import check_columns, read_logs
 from armload.app.cli.printing import console, print_json, table, working
 from armload.errors import UsageError
 from armload.service.finite import finite

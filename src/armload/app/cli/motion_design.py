@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import OutputFile
-from armload.app.cli.named import arm_of, check_columns, surroundings_of
+from armload.app.cli.named import arm_of, surroundings_of
+from armload.app.cli.named_logs import check_columns
 from armload.app.cli.outputs import check_motion_file, check_outputs
 from armload.app.cli.printing import console, print_json, print_note, table, working
 from armload.errors import UsageError

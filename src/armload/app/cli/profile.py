@@ -16,7 +16,8 @@ from armload.app.cli.arguments import (
     weighed,
 )
 from armload.app.cli.idle import given, refuse_idle
-from armload.app.cli.named import arm_of, payload_of, read_logs
+from armload.app.cli.named import arm_of, payload_of
+from armload.app.cli.named_logs import read_logs
 from armload.app.cli.outputs import check_unchanged, contents_of
 from armload.app.cli.printing import print_json, print_note, working
 from armload.app.cli.profile_text import fields_of, in_time, of_motors, print_profile

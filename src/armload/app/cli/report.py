@@ -18,7 +18,8 @@ from armload.app.cli.arguments import (
     output_file,
 )
 from armload.app.cli.idle import given, refuse_idle
-from armload.app.cli.named import arm_of, arm_of_dataset, payload_of, read_logs
+from armload.app.cli.named import arm_of, arm_of_dataset, payload_of
+from armload.app.cli.named_logs import read_logs
 from armload.app.cli.outputs import check_page
 from armload.app.cli.printing import print_note, print_table, working
 from armload.errors import UsageError

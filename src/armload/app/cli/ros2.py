@@ -16,7 +16,8 @@ from armload.app.cli.arguments import (
     file_name,
 )
 from armload.app.cli.idle import given, refuse_idle
-from armload.app.cli.named import arm_of, motion_of, payload_of, read_logs, world_of
+from armload.app.cli.named import arm_of, motion_of, payload_of, world_of
+from armload.app.cli.named_logs import read_logs
 from armload.app.cli.printing import print_note
 
 _EXAMPLES = """\
