@@ -1,5 +1,6 @@
 """The simulation obeys its own equation of motion, and its logs carry the payload and nothing else unless asked."""
 
+import re
 from dataclasses import replace
 
 import mujoco
@@ -368,3 +369,18 @@ def test_mistakes_are_named(panda):
         simulate(arm("ur10e"), ur_motion, world=World.nominal(panda))
     with pytest.raises(ArmError, match="offset of the world"):
         replace(World.nominal(panda), offset=np.zeros(6))
+
+
+def test_a_simulation_that_diverges_says_so_and_leaves_no_file_behind(tmp_path, monkeypatch):
+    """MuJoCo writes its warnings to MUJOCO_LOG.TXT in the working folder, and goes on with 1e5 rad."""
+    monkeypatch.chdir(tmp_path)
+    panda = arm("panda")
+    locked = re.sub(
+        r'(name="panda_joint7".*?)lower="[^"]*" upper="[^"]*"', r'\1lower="0.5" upper="0.5"', panda.urdf, flags=re.S
+    )
+    assert locked != panda.urdf
+    build_model(replace(panda, urdf=locked))
+    wild = Run(taie2024(), gains=Gains(np.full(7, 1e5), np.zeros(7)))
+    with pytest.raises(ArmError, match="diverged"):
+        many(panda, [wild], rate=100.0)
+    assert not list(tmp_path.iterdir())

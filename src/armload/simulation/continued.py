@@ -18,7 +18,7 @@ from armload.arms import Arm
 from armload.errors import ArmError, MotionError
 from armload.motion import Motion
 from armload.simulation.controller import Command, Gains
-from armload.simulation.plant import build_model
+from armload.simulation.plant import build_model, diverged
 from armload.simulation.resolution import FINE, Resolution
 from armload.simulation.rollout import Clock, damping_at_rest, roll_on
 from armload.simulation.runs import Run, payload_parameters, prepare
@@ -119,7 +119,7 @@ class ContinuedRun:
         if self._comes_to_rest:
             state = replace(state, damping=damping_at_rest(state))
         (q, dq, tau), self._state = roll_on(state, clock)
-        if not np.all(np.isfinite(tau)):
+        if diverged(dq) or not np.all(np.isfinite(tau)):
             raise ArmError(f"the simulated {self._arm.name} diverged: its gains do not suit its motion")
         tau = tau + self._sticking(dq)
         t = (self._rows + np.arange(samples)) / self.rate

@@ -17,7 +17,8 @@ Source: MuJoCo's documentation, chapter Computation, "Numerical integration"; th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,10 +33,34 @@ if TYPE_CHECKING:
     import mujoco
 
 _NEWTON_STEPS = 20
+_TOO_FAST = 100.0  # [rad/s, m/s] ten times what the joints of arms are built for: the integration is not stable
 _SETTLED = 1e-9  # [N·m] torque left over at the start
 _NUDGE = 1e-6  # [rad] finite difference for the Jacobian of the static balance
 
 
+@contextmanager
+def quiet() -> Iterator[None]:
+    """MuJoCo's warnings go nowhere; it writes them into a file MUJOCO_LOG.TXT in the working folder otherwise.
+
+    What they are about does not matter here (a joint whose limits leave it no room) or is found by who simulates (a run
+    that diverges).
+    """
+    import mujoco
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)  # noqa: ARG005
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def diverged(dq: NDArray[np.float64]) -> bool:
+    """Whether joint velocities (..., n) are no arm's any more, or not finite: MuJoCo integrates on for all that."""
+    return not bool((np.abs(dq) < _TOO_FAST).all())
+
+
+@quiet()
 def build_model(arm: Arm, gains: Gains | None = None, step: float = 5e-4) -> mujoco.MjModel:
     """The arm, with all that is attached to it, as a MuJoCo model.
 

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.simulation.controller import Command, Gains
+from armload.simulation.plant import quiet
 from armload.simulation.resolution import FINE, Resolution
 from armload.simulation.worlds import World
 
@@ -94,7 +95,7 @@ def damping_at_rest(run: Prepared) -> NDArray[np.float64]:
 def roll_out(
     runs: Sequence[Prepared], clock: Clock, workers: int
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
-    """(q, dq, tau) of each run, each (samples, n), noise-free; NaN where a run diverged."""
+    """(q, dq, tau) of each run, each (samples, n), noise-free; of no use where a run diverged (`plant.diverged`)."""
     states, applied = _picard(runs, clock, workers)
     return [_log(run, clock, *_leapfrog(run, state), u) for run, state, u in zip(runs, states, applied, strict=True)]
 
@@ -149,7 +150,8 @@ def _picard(runs: Sequence[Prepared], clock: Clock, workers: int) -> tuple[NDArr
         """The states, the disturbance that acted, and v_{j+1}, of which `after` was expected."""
         for model, (taken_off,) in zip(models, damping, strict=True):
             model.dof_damping[:] = taken_off
-        found = rollout.rollout(models, threads, start, control - applied + damping * after)[0]
+        with quiet():
+            found = rollout.rollout(models, threads, start, control - applied + damping * after)[0]
         states = np.asarray(found, dtype=float)
         for model in models:
             model.dof_damping[:] = 0.0

@@ -16,7 +16,7 @@ from armload.motion import Motion
 from armload.recording import Recording
 from armload.runtime.extras import require
 from armload.simulation.controller import Command, Gains
-from armload.simulation.plant import build_model, settled_start
+from armload.simulation.plant import build_model, diverged, settled_start
 from armload.simulation.resolution import FINE, Resolution
 from armload.simulation.rollout import Clock, Prepared, roll_out
 from armload.simulation.sensors import Sensors
@@ -140,7 +140,7 @@ def _batch(arm: Arm, gains: Gains, runs: list[Run], clock: Clock, workers: int) 
         prepared.append(prepare(actual[id(world)], run.gains or gains, run, world, commands[id(run.motion)], clock))
     logs = []
     for run, (q, dq, tau) in zip(runs, roll_out(prepared, clock, workers), strict=True):
-        if not np.all(np.isfinite(tau)):
+        if diverged(dq) or not np.all(np.isfinite(tau)):
             raise ArmError(
                 f"the simulated {arm.name} diverged on the motion {_name(run.motion)!r}: its gains do not suit it"
             )
