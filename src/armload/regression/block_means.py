@@ -114,8 +114,10 @@ class BlockMeans:
 
     def mapped(self, change: Callable[[NDArray], NDArray]) -> BlockMeans:
         """The blocks of a linear function of the signal; change: (B, *shape) → (B, *new)."""
-        out = copy(self)
-        out.sums, out._times, out._weights = change(self.sums), self._times.copy(), self._weights.copy()
+        out, used = copy(self), change(self.sums[: self._filled + 1])
+        out.sums = np.zeros((_MOST_BLOCKS, *used.shape[1:]))  # what is not used takes no memory
+        out.sums[: len(used)] = used
+        out._times, out._weights = self._times.copy(), self._weights.copy()
         return out
 
     @classmethod
