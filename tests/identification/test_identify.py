@@ -22,6 +22,7 @@ from armload.motion import random_motion, taie2024
 from armload.payloads import test_payload as box_of_the_examples
 from armload.posterior import PosteriorLeastSquares, shipped_model
 from armload.recording import Recording, read_recording, shared_samples
+from armload.recording.copies import copied_samples
 from armload.regression import payload_prior_std
 from armload.simulation import Sensors, World, simulate
 
@@ -180,6 +181,31 @@ def test_a_log_is_not_its_own_tare(loaded, real_like, method, part):
         tare = replace(tare, t=tare.t - tare.t[0])
     with pytest.raises(RecordingError, match=f"share {len(tare)} measured samples: .* leave the tare out"):
         identify(loaded, panda, tare=tare, method=method)
+
+
+@pytest.mark.parametrize("form", ["3 decimals", "6 decimals", "5 digits", "float32", "degrees"])
+def test_a_log_in_fewer_digits_is_not_its_own_tare(loaded, real_like, form):
+    """What another program wrote of the same run weighs nothing against it, whatever the arm holds."""
+    panda, _ = real_like
+    forms = {
+        "3 decimals": lambda x: x.round(3),
+        "6 decimals": lambda x: x.round(6),
+        "5 digits": lambda x: np.vectorize(lambda number: float(f"{number:.5g}"))(x),
+        "float32": np.float32,
+        "degrees": lambda x: np.deg2rad(np.rad2deg(x).round(6)),
+    }
+    of = forms[form]
+    copy = replace(loaded, q=of(loaded.q), dq=of(loaded.dq), tau=loaded.tau if form == "degrees" else of(loaded.tau))
+    for tare in (copy, copy.between(1.0, 3.0)):
+        with pytest.raises(RecordingError, match=r"share \d+ measured samples: .* leave the tare out"):
+            identify(loaded, panda, tare=tare)
+
+
+def test_two_runs_of_one_motion_are_no_copies_of_each_other(simulated, real_data):
+    real = [read_recording(real_data / f"ur10e_{which}.csv") for which in ("unloaded", "loaded_2805g")]
+    for log, other in (real, (simulated("box", 1), simulated("box", 2))):
+        assert copied_samples(log, log) > 0.5 * len(log)
+        assert copied_samples(log, other) == 0
 
 
 def test_the_beginning_of_a_log_is_a_tare_for_the_rest_of_it(loaded, real_like):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armload import arm
+from armload import arm, identify
 from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.motion import random_motion
@@ -33,10 +33,21 @@ def world(panda):
 
 
 @pytest.fixture(scope="module")
-def profile(panda, world):
+def logs(panda, world):
     motions = [random_motion(panda, seed, duration=8.0) for seed in range(4)]
     runs = [Run(motion, None, world, Sensors.panda(panda), k) for k, motion in enumerate(motions)]
-    return learn_profile(panda, simulate_many(panda, runs, rate=100.0, duration=8.0, workers=1, resolution=COARSE))
+    return simulate_many(panda, runs, rate=100.0, duration=8.0, workers=1, resolution=COARSE)
+
+
+@pytest.fixture(scope="module")
+def learned(logs):
+    """One of the profile's logs."""
+    return logs[1]
+
+
+@pytest.fixture(scope="module")
+def profile(panda, logs):
+    return learn_profile(panda, logs)
 
 
 def streamed(panda, world, profile, held, look=None, seconds=SECONDS):
@@ -60,6 +71,28 @@ def streamed(panda, world, profile, held, look=None, seconds=SECONDS):
     learned = stream.learned("today")
     stream.close()
     return last, learned
+
+
+@pytest.mark.parametrize("which", ["stream", "tare"])
+def test_a_stream_of_what_the_profile_is_learned_from_is_doubted_as_a_log_of_it_is(panda, learned, profile, which):
+    """What they say counts twice, and the intervals are too narrow."""
+    other = simulate(panda, random_motion(panda, 9, duration=4.0), sensors=Sensors.panda(panda), rate=100.0, seed=9)
+    log, tare = (learned, None) if which == "stream" else (other, learned)
+    stream = OnlineIdentifier(panda, tare, profile=profile)
+    for sample in log:
+        stream.update(*sample)
+    last, doubts = stream.conclude(), stream.doubts
+    stream.close()
+    of_log = identify(log, panda, tare=tare, profile=profile)
+    said = next(note for note in of_log.notes if "learned from these very measurements" in note)
+    assert said in last.notes
+    assert said in doubts
+    assert last.interval == of_log.interval == "approximate"
+    sound = OnlineIdentifier(panda, profile=profile)
+    for sample in other:
+        sound.update(*sample)
+    assert said not in sound.conclude().notes
+    sound.close()
 
 
 def test_samples_of_a_stream_have_the_marks_of_a_log_of_them_and_a_bounded_number(monkeypatch):

@@ -26,6 +26,7 @@ from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
 from armload.simulation import Run, World, simulate_many
 from armload.simulation.resolution import COARSE
+from armload.survey.rows import answered
 
 DAYS, SECONDS = 6, 8.0
 OFFSET = np.array([0.08, 0.12, 0.06, 0.10, 0.03, 0.04, 0.01])  # [N·m] of a day, 1 sigma
@@ -108,6 +109,17 @@ def test_a_part_of_an_old_log_is_not_learned_again(panda, life, young, rows):
         learn_profile(panda, [other, part], known=young)
     assert young.learned_from(part) == young.sessions[1].name
     assert young.learned_from(other) is None
+
+
+def test_an_answer_that_is_doubted_as_a_whole_is_doubted_in_its_parts_and_in_a_survey(panda, life, young):
+    """A survey's rows are the parts, and programs read the segments."""
+    answer = identify(life[1][0], panda, profile=young)
+    assert answer.interval == "approximate"
+    assert "learned from these very measurements" in answer.notes[0]
+    assert [part["interval"] for part in answer.to_dict()["segments"]] == ["approximate"] * len(answer.segments)
+    for row in answered(answer, {}):
+        assert row["interval"] == "approximate"
+        assert answer.notes[0] in row["notes"]
 
 
 def test_two_parts_of_a_log_that_overlap_are_not_learned_together(panda, life):

@@ -127,16 +127,15 @@ def identify(
         if not other.doubts and other.left <= EXPLAINS * max(account.left, 1.0):
             account = other
             if tare is None or profile is not None:
-                answer = replace(other.answer, interval="approximate", notes=(*other.answer.notes, UNCHECKED))
-                account = other._replace(answer=answer)
+                account = other._replace(answer=_doubted_throughout(other.answer, UNCHECKED))
     answer, own = account.answer, None
     if answer.interval == "approximate" and answer.gravity is None and recording.channel == "measured":
         way = likelier_gravity(recording, arm, partial(torque_scale, recording, arm))
         if way is not None:
-            answer = replace(answer, notes=(mounted_otherwise(way, arm), *answer.notes))
+            answer = _doubted_throughout(answer, mounted_otherwise(way, arm))
     if profile is not None:
         own = profile.learned_from(recording) or (None if tare is None else profile.learned_from(tare))
-    return answer if own is None else replace(answer, interval="approximate", notes=(learned_from(own), *answer.notes))
+    return answer if own is None else _doubted_throughout(answer, learned_from(own))
 
 
 class _Account(NamedTuple):
@@ -218,6 +217,12 @@ def _weigh_otherwise(before: Identification, after: Identification) -> bool:
 def _doubted(answer: Identification, note: str) -> Identification:
     """An answer that something speaks against."""
     return replace(answer, interval="approximate", notes=(note, *answer.notes))
+
+
+def _doubted_throughout(answer: Identification, note: str) -> Identification:
+    """An answer that something speaks against in all parts of the log, which surveys and programs read."""
+    parts = tuple(replace(part, answer=_doubted(part.answer, note)) for part in answer.segments)
+    return replace(_doubted(answer, note), segments=parts)
 
 
 def _check_same_mounted(tare: Recording, arm: Arm, asked: Asked) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from armload.arms import rated_effort
 from armload.errors import IdentificationError
 from armload.identification.arm_notes import arm_changed
+from armload.identification.notes import learned_from as known_already
 from armload.inertia import HELD
 from armload.online.thresholds import LEARN_FROM
 from armload.posterior import PosteriorLeastSquares, Profile
@@ -22,16 +23,30 @@ class Seen:
     """Marks of a stream's samples, by which a log or a stream of the same measurements is known (`mark_of`).
 
     Of many, those of every other, fourth, eighth value are kept.
+
+    Args:
+        known: the session of the stream's profile that holds some of its samples, or of its tare's; None: none does.
     """
 
-    def __init__(self) -> None:
-        self.marks: dict[str, None] = {}
-        self._every = 1
+    known: str | None = None
 
-    def take(self, sample: Sample) -> None:
-        """Go on by one sample."""
+    def __init__(self, known: str | None = None) -> None:
+        self.marks: dict[str, None] = {}
+        self._every, self.known = 1, known
+
+    @property
+    def doubt(self) -> tuple[str, ...]:
+        """That the profile knows the samples already, as of a log; nothing where it does not."""
+        return () if self.known is None else (known_already(self.known),)
+
+    def take(self, sample: Sample, profile: Profile | None = None) -> None:
+        """Go on by one sample; `profile`: of the stream."""
         mark = mark_of(sample)
-        if mark is None or int(mark, 16) % self._every:
+        if mark is None:
+            return
+        if self.known is None and profile is not None:
+            self.known = profile.holding([mark])
+        if int(mark, 16) % self._every:
             return
         self.marks[mark] = None
         while len(self.marks) > _MOST:

@@ -71,6 +71,7 @@ class OnlineIdentifier:
         self.arm = arm = arm if isinstance(arm, Arm) else arm_named(arm)
         tare = tare if tare is None or isinstance(tare, Recording) else read_recording(tare, arm)
         self.profile, self._tared = profile, tare is not None
+        self._of_tare = None if profile is None or tare is None else profile.learned_from(tare)
         self._engine = first = choose(arm, tare, method, live=True, profile=profile).identifier
         know(first, known)
         if tare is not None and isinstance(first, PosteriorLeastSquares):
@@ -109,7 +110,7 @@ class OnlineIdentifier:
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the error bars, but for what only the end shows."""
-        return self._judgement.doubts.sentences
+        return (*self._seen.doubt, *self._judgement.doubts.sentences)
 
     @property
     def health(self) -> Health:
@@ -129,7 +130,7 @@ class OnlineIdentifier:
         self._since: float | None = None
         self._since_before: float | None = None  # the same before the last change
         self._blind = False  # whether a change of payload would not be seen now
-        self._seen = Seen()
+        self._seen = Seen(self._of_tare)
         self.event: Event | None = None
         self._event_t, self._event_shift = -math.inf, 0.0  # of the event on the samples' clock, and to the stream's [s]
         self._judgement.reset()
@@ -154,7 +155,7 @@ class OnlineIdentifier:
             return self._present()
         self._since = self._stream.clock if self._since is None else self._since
         if self.profile is not None:
-            self._seen.take(sample)
+            self._seen.take(sample, self.profile)
         if self._watch is None:
             self._pass_on(sample)
         else:
@@ -306,7 +307,8 @@ class OnlineIdentifier:
         stream, judged, watch, moving = self._stream, self._judgement, self._watch, self._stream.moving
         change, contact, drift = (None, None, None) if watch is None else watch.likely
         sure = watch is None or watch.sure
-        notes = judged.words(None if sure else watch, self._blind, moving)
+        notes = (*self._seen.doubt, *judged.words(None if sure else watch, self._blind, moving))
+        doubted = judged.doubted or self._blind or bool(self._seen.doubt)
         return OnlineEstimate.of(
             {
                 **vars(judged.estimate),
@@ -318,7 +320,7 @@ class OnlineIdentifier:
                 "relative_to": self.relative_to,
                 "method": self.method,
                 "same_arm_assumed": (self._tared or self.profile is not None) and not judged.doubts.asked_whose,
-                "calibrated": self.engine.calibrated and sure and not (judged.doubted or self._blind),
+                "calibrated": self.engine.calibrated and sure and not doubted,
                 "p_change": change,
                 "p_contact": contact,
                 "p_drift": drift,

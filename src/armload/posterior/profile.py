@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,8 +112,13 @@ class Profile:
 
     def holding(self, marks: Iterable[str]) -> str | None:
         """The session of samples with some of these marks (`marks_of`, `mark_of`); None: there is none."""
-        asked = set(marks)
-        return next((one.name for one in self.sessions if asked.intersection(one.marks)), None)
+        found = [self._of_marks[mark] for mark in marks if mark in self._of_marks]
+        return self.sessions[min(found)].name if found else None
+
+    @cached_property
+    def _of_marks(self) -> dict[str, int]:
+        """The first session of each mark: streams ask of sample after sample."""
+        return {mark: k for k in reversed(range(len(self.sessions))) for mark in self.sessions[k].marks}
 
     def check(self, arm: Arm) -> None:
         """See that it is of this arm, on this base.
