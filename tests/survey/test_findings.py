@@ -192,6 +192,20 @@ def test_a_table_keeps_every_name_whatever_that_is(suffix, tmp_path):
     assert read_rows(tmp_path / f"survey{suffix}")[0] == rows
 
 
+def test_a_survey_of_which_no_log_was_answered_has_its_page(tmp_path, capsys):
+    nothing = row("a", 0, status="unusable", reason="cut off", held=None, mass=None, t0=None, t1=None, misfit=None)
+    for some in ([nothing], [nothing, nothing | {"date": None, "log": "b.csv"}]):
+        write_rows(tmp_path / "survey.json", some, 7)
+        assert main(["survey", "report", str(tmp_path / "survey.json"), "--out", str(tmp_path / "r.html")]) == 0
+        page = (tmp_path / "r.html").read_text(encoding="utf-8")
+        assert "Nothing was held in any log." in page
+        assert "No log was answered." in page
+        assert page.count("cut off") == len(some)
+    write_rows(tmp_path / "survey.json", [], 7)
+    assert main(["survey", "report", str(tmp_path / "survey.json"), "--out", str(tmp_path / "r.html")]) == 2
+    assert "survey.json is no survey that can be read (it has no rows)" in capsys.readouterr().err
+
+
 def test_a_survey_without_dates_has_its_page_too(rows, tmp_path):
     for one in rows:
         one["date"] = None

@@ -150,6 +150,8 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
 
 def _arms(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int) -> Section:
     """Offsets and friction, a panel for each arm, over time."""
+    if not any(row["status"] == ANSWERED for row in rows):
+        return Section("Drift of the arms", "No log was answered.")
     shown = sorted(findings, key=lambda f: not f.advice)[:_MOST_ARMS]
     figures = []
     for name, what in (("offset", "Torque offset"), ("coulomb", "Coulomb friction")):

@@ -67,6 +67,8 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
                 rows = list(csv.DictReader(file))
         else:
             rows = json.loads(path.read_text(encoding="utf-8"))
+        if not rows:
+            raise ValueError("it has no rows")
         n = sum(name.startswith(_JOINTS) for name in rows[0])
         kinds = columns(n)
         if not set(rows[0]) >= _OF_SURVEY:
