@@ -156,6 +156,18 @@ def test_dataset_built_again_is_the_same_and_another_is_refused(work, call):
     assert "payloads" in captured.err
 
 
+@pytest.mark.parametrize("robot", ["ur10e", "{of}.urdf"])  # which has no such frame, or has one
+def test_a_data_set_of_one_arm_is_not_learned_from_as_of_another(work, call, tmp_path, robot):
+    heavier = arm("panda").urdf.replace('<mass value="', '<mass value="1')
+    (tmp_path / "own.urdf").write_text(heavier)
+    robot = robot.format(of=tmp_path / "own")
+    captured = call("train", "--dataset", work / "data", "--out", tmp_path / "m.safetensors", "--robot", robot, code=2)
+    assert captured.out == ""
+    assert f"{work / 'data'} was made with the arm panda about panda_link8" in captured.err
+    assert "--robot" in captured.err
+    assert not (tmp_path / "m.safetensors").exists()
+
+
 def test_dataset_of_ideal_sensors_and_a_named_payload(call, tmp_path):
     write_payload(tmp_path / "hand.json", franka_hand())
     call("dataset", "--out", tmp_path / "d", "--payloads", tmp_path / "hand.json", "--rows", "20", "--no-noise")

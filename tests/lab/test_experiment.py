@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,30 @@ def test_a_run_that_is_out_of_time_says_where_it_stopped(tmp_path):
     cells = run_tasks(tasks(tmp_path, 3), tmp_path / "cells", until=-1.0, say=messages.append, part="cell")
     assert messages == ["stopped before cell 2 of 3: run it again to go on"]
     assert list(cells) == ["of-0"]
+
+
+class Looked(dict):
+    """A task's keys, which count how often all of them are looked at."""
+
+    count = 0
+
+    def __iter__(self):
+        Looked.count += 1
+        return super().__iter__()
+
+
+def test_progress_counts_the_finished_tasks_and_looks_at_each_as_often_however_many_there_are(tmp_path, monkeypatch):
+    looked = []
+    for count in (4, 16):
+        monkeypatch.setattr(Looked, "count", 0)
+        some = [replace(task, keys=Looked(task.keys)) for task in tasks(tmp_path, count)]
+        some.insert(1, Task("powers", {"x-2": "a", "x-4": "b"}, powers, (tmp_path, 5)))
+        run_tasks(some[:2], tmp_path / f"{count}")
+        shown = []
+        run_tasks(some, tmp_path / f"{count}", progress=lambda done, total, shown=shown: shown.append((done, total)))
+        assert shown == [(done, count + 1) for done in range(3, count + 2)]
+        looked.append(Looked.count / count)
+    assert looked[1] <= looked[0]
 
 
 def test_a_result_that_is_no_json_leaves_the_old_file_alone(tmp_path):

@@ -1,5 +1,7 @@
 """Logs whose times are dates: the same samples, and the day they were recorded."""
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -97,6 +99,15 @@ def test_a_column_of_dates_does_not_displace_a_column_of_time(tmp_path):
 def test_dates_that_make_no_sense_are_refused_by_their_place(tmp_path, cells, columns, says):
     with pytest.raises(RecordingError, match=says):
         read_recording(csv(tmp_path / "log.csv", cells), columns=columns)
+
+
+@pytest.mark.parametrize(("began", "dated"), [(0.0, False), (1.79e9, True), (2.53e11, True), (2.54e11, False)])
+def test_a_clock_says_a_date_only_where_there_is_one_of_four_digits(began, dated):
+    """`datetime` knows no other: a log whose clock is wrong has none, like one whose clock counts from its start."""
+    log = Recording(began + 0.01 * np.arange(5), np.zeros((5, 2)), np.zeros((5, 2)), np.zeros((5, 2)))
+    assert (log.date is not None) == dated
+    if log.date is not None:
+        assert 2001 <= datetime.fromtimestamp(log.date, UTC).year <= 9999
 
 
 def test_dates_tell_the_age_of_a_tare(tmp_path):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import resource
+
 import numpy as np
 import pytest
 
@@ -61,3 +64,16 @@ def test_a_row_that_is_not_there_is_an_index_error(both):
 
 def test_samples_come_one_by_one_and_end(both):
     assert sum(1 for _ in both[1].select(slice(0, 50))) == 50
+
+
+def test_a_folder_without_room_for_the_samples_is_named(tmp_path):
+    log = Recording(0.001 * np.arange(COUNT), *np.zeros((3, COUNT, 4)))
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, most[1]))  # as where the disk is full
+    try:
+        with pytest.raises(OSError, match="too large") as error:
+            spooled([log], "log", tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, most)
+    assert (error.value.errno, error.value.filename) == (errno.EFBIG, str(tmp_path))
+    assert not list(tmp_path.iterdir())

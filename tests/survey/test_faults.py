@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import errno
+import gzip
 import os
+import resource
 import shutil
 import subprocess
 import sys
+import tempfile
 import threading
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -14,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from armload.errors import ArmloadError, UsageError
+from armload.errors import ArmloadError, RecordingError, UsageError
 from armload.lab.cells import load_cells, save_cell
 from armload.motion import random_motion
 from armload.recording import write_recording
@@ -169,6 +174,45 @@ def test_a_log_that_does_not_fit_in_memory_is_asked_again_and_is_no_bug(share, w
     again = survey([str(share)], SETTINGS, tmp_path / "survey.json", jobs=1)
     assert again.anew == 3
     assert answers(again.rows) == answers(whole)
+
+
+@contextmanager
+def no_room():
+    """Within, a file of more than a cell's size cannot be written, as where the disk is full."""
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, most[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, most)
+
+
+def test_a_log_for_which_there_is_no_room_is_asked_again(share, tmp_path):
+    (share / "3.csv.gz").write_bytes(gzip.compress((share / "0.csv").read_bytes()))
+    paths, out = [str(share / "3.csv.gz")], tmp_path / "survey.json"
+    with no_room():
+        (row,) = survey(paths, SETTINGS, out, jobs=1).rows
+    assert f"3.csv.gz cannot be unpacked into {tempfile.gettempdir()}" in row["reason"]
+    assert "TMPDIR" in row["reason"]
+    again = survey(paths, SETTINGS, out, jobs=1)
+    assert (again.anew, again.unusable) == (1, 0)
+
+
+@pytest.mark.parametrize(("number", "anew"), [(errno.EIO, 3), (errno.ENOSPC, 3), (None, 0)])
+def test_what_the_system_could_not_read_is_asked_again_and_what_is_damaged_is_not(
+    share, tmp_path, monkeypatch, number, anew
+):
+    def fails(*_):
+        try:
+            raise OSError(number, os.strerror(number)) if number else OSError("damaged, says its decoder")
+        except OSError:
+            raise RecordingError("cannot be read") from None
+
+    with monkeypatch.context() as poor:
+        poor.setattr(Settings, "recording", fails)
+        assert survey([str(share)], SETTINGS, tmp_path / "survey.json", jobs=1).unusable == 3
+    again = survey([str(share)], SETTINGS, tmp_path / "survey.json", jobs=1)
+    assert (again.anew, again.unusable) == (anew, 3 - anew)
 
 
 @pytest.mark.full  # some seconds

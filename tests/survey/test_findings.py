@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import base64
 import re
 import warnings
 from itertools import pairwise
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from armload.app.cli import main
-from armload.survey import write_rows
+from armload.survey import read_rows, write_rows
 from armload.survey.findings import arm_findings, doubtful
 from armload.survey.learning import empty_stretches
-from armload.survey.report import survey_sections
+from armload.survey.report import survey_sections, write_survey_report
 from armload.survey.rows import columns
 from armload.survey.shift import shifts
 
@@ -118,6 +120,15 @@ def test_nothing_is_said_of_arms_that_could_not_be_asked(rows):
     assert not few.retare
 
 
+def test_what_asks_for_nothing_has_no_mark_that_it_does():
+    rows = [row("once", day, moves=day == 1, changed=day == 1) for day in range(3)]
+    findings = arm_findings(rows)
+    assert findings[0].advice == ""
+    (cells,) = survey_sections(rows, findings, 7)[0].tables[0].rows
+    assert "33 %" in cells
+    assert not [cell for cell in cells if "!" in cell]
+
+
 def test_only_stretches_that_are_empty_beyond_doubt_are_learned_from():
     empty = {"held": False, "mass_low": -0.01, "mass_high": 0.01}
     sound = row("a", 3, **empty)
@@ -155,6 +166,44 @@ def test_arms_named_in_a_script_that_the_font_lacks_are_drawn_without_a_warning(
     assert main(["survey", "report", str(tmp_path / "survey.json"), "--out", str(tmp_path / "r.html")]) == 0
     assert "Glyph" not in capsys.readouterr().err
     assert "日本" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+NAMES = ("$x_$y", "$\\bad$", "_left", "tab\there", "escape\x1b[31m", "two\nlines", "<b>", "*a*")
+
+
+def test_an_arm_has_its_name_in_every_picture_whatever_that_is(tmp_path):
+    rows = [row(name, day) for name in NAMES for day in range(3)]
+    write_rows(tmp_path / "survey.parquet", rows, 7)
+    write_survey_report(tmp_path / "survey.parquet", tmp_path / "report.html")
+    pictures = re.findall("base64,([A-Za-z0-9+/=]+)", (tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert len(pictures) == 4
+    for picture in pictures:
+        ElementTree.fromstring(base64.b64decode(picture))  # a browser draws nothing of what is no XML
+    over_time, _ = survey_sections(rows, arm_findings(rows), 7)[1].figures[0]
+    (legend,) = over_time.legends
+    assert {text.get_text() for text in legend.get_texts()} == set(NAMES)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".parquet"])
+def test_a_table_keeps_every_name_whatever_that_is(suffix, tmp_path):
+    odd = ("cr\rlf\n.csv", 'comma,"quote".csv', "\r", " space ", "=1+1", "\x1b", "日本")
+    rows = [row(name, 0, log=name, notes=name) for name in odd]
+    write_rows(tmp_path / f"survey{suffix}", rows, 7)
+    assert read_rows(tmp_path / f"survey{suffix}")[0] == rows
+
+
+def test_a_survey_of_which_no_log_was_answered_has_its_page(tmp_path, capsys):
+    nothing = row("a", 0, status="unusable", reason="cut off", held=None, mass=None, t0=None, t1=None, misfit=None)
+    for some in ([nothing], [nothing, nothing | {"date": None, "log": "b.csv"}]):
+        write_rows(tmp_path / "survey.json", some, 7)
+        assert main(["survey", "report", str(tmp_path / "survey.json"), "--out", str(tmp_path / "r.html")]) == 0
+        page = (tmp_path / "r.html").read_text(encoding="utf-8")
+        assert "Nothing was held in any log." in page
+        assert "No log was answered." in page
+        assert page.count("cut off") == len(some)
+    write_rows(tmp_path / "survey.json", [], 7)
+    assert main(["survey", "report", str(tmp_path / "survey.json"), "--out", str(tmp_path / "r.html")]) == 2
+    assert "survey.json is no survey that can be read (it has no rows)" in capsys.readouterr().err
 
 
 def test_a_survey_without_dates_has_its_page_too(rows, tmp_path):

@@ -77,6 +77,17 @@ def test_a_link_that_leads_to_itself_is_one_log_and_the_others_are_found(folder)
     assert found == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-1/loop.csv", "cell-2/c.mcap"]
 
 
+@pytest.mark.parametrize("place", ["cell-1/far.csv", "cell-1/far", "cell-1/metadata.yaml"])
+def test_a_path_that_cannot_be_asked_is_not_there_and_the_others_are_found(folder, place):
+    """As behind a folder without access, which root may enter: a name that is too long is an error, not an absence."""
+    far = "x" * 300 + ".csv"
+    (folder / place).symlink_to(far)
+    found = {log.name: log for log in find_logs([str(folder), far])}
+    assert {str(folder / "cell-1" / "a.csv"), str(folder / "cell-2" / "c.mcap"), far} <= set(found)
+    assert not found[far].there
+    assert (str(folder / place) in found) == place.endswith(".csv")
+
+
 def test_a_folder_that_cannot_be_listed_is_one_log_and_the_others_are_found(folder, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, _: Path(path).name != "deep")  # root may read whatever it likes
     assert names(find_logs([str(folder)]), folder) == ["cell-1/a.csv", "cell-1/deep", "cell-2/c.mcap"]
@@ -234,6 +245,7 @@ def test_what_the_package_of_a_store_raises_is_an_error_of_the_store(monkeypatch
     [
         (["cell-3/*.csv"], None, "no log in"),
         (["@none.txt"], None, "the list none.txt cannot be read"),
+        (["@print0.txt"], None, "the list print0.txt holds bytes of zero"),
         (["cell-1"], "(", "no regular expression"),
         (["cell-1"], "cell", "has no group"),
         (["cell-1"], "arm-([0-9])", "names no arm in"),
@@ -242,5 +254,6 @@ def test_what_the_package_of_a_store_raises_is_an_error_of_the_store(monkeypatch
 )
 def test_what_cannot_be_is_refused_in_a_sentence(folder, monkeypatch, paths, arm_of, said):
     monkeypatch.chdir(folder)
+    Path("print0.txt").write_text("cell-1/a.csv\0cell-2/c.mcap\0")
     with pytest.raises(UsageError, match=said.replace("(", r"\(")):
         find_logs(paths, arm_of)

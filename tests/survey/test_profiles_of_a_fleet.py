@@ -46,6 +46,26 @@ def test_an_exchanged_arm_is_not_averaged_with_the_one_before(panda, tmp_path, m
     assert sound["relative_to"] == "profile"
 
 
+@pytest.mark.parametrize("arm", ["a", "site/a", "{folder}/logs/a"])
+def test_a_profile_is_written_where_the_next_survey_looks_for_it(arm, tmp_path, monkeypatch):
+    """Also of an arm that --arm-of names by a whole path: never beside its logs."""
+    arm = arm.format(folder=tmp_path)
+    empty = {"arm": arm, "log": "a.csv", "part": 0, "date": None, "key": "k", "status": "answered", "determined": "m"}
+    empty |= {"held": False, "moves": False, "mass_low": -0.1, "mass_high": 0.1, "t0": 0.0, "t1": 30.0}
+    monkeypatch.setattr(learning, "_learned", lambda *_: (b"learned", [{}], []))
+    monkeypatch.setattr(learning, "save_profile", lambda made, path: write_anywhere(path, made))
+    learning.learn_profiles([empty], Settings("panda"), tmp_path / "p")
+    found = Settings("panda", profile=f"{tmp_path}/p/{{arm}}.profile").of_arm("profile", arm)
+    assert found is not None
+    assert found.read_bytes() == b"learned"
+
+
+def write_anywhere(path, content):
+    """As `save_profile`, which makes the folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+
+
 def test_a_stretch_that_holds_something_is_left_out_and_the_profile_made_of_the_others(panda):
     """Three days, one of them with half a kilogram that nobody saw: its number, and a profile of the other two."""
     world = World.real_like(panda, 3)

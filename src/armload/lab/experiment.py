@@ -91,6 +91,13 @@ def run_tasks(
         say(of_damaged(damaged))
     keys = {name: key for task in tasks for name, key in task.keys.items()}
     cells = {name: there[name] for name, key in keys.items() if name in there and there[name].get("key") == key}
+    lacking = [sum(name not in cells for name in task.keys) for task in tasks]
+    waiting: dict[str, list[int]] = {}  # tasks by the cells that they lack
+    for number, task in enumerate(tasks):
+        for name in task.keys:
+            if name not in cells:
+                waiting.setdefault(name, []).append(number)
+    finished = lacking.count(0)
 
     def unfinished() -> Iterator[Task]:
         for number, task in enumerate(tasks, start=1):
@@ -105,11 +112,16 @@ def run_tasks(
             yield left
 
     def keep(measured: Cells) -> None:
+        nonlocal finished
         for cell in measured.values():  # where a worker's disk is not ours
             if finished_cell(folder, cell["name"], cell["key"]) is None:
                 save_cell(folder, cell, indent)
         cells.update(measured)
-        progress(sum(all(name in cells for name in task.keys) for task in tasks), len(tasks))
+        for name in measured:
+            for number in waiting.pop(name, ()):
+                lacking[number] -= 1
+                finished += lacking[number] == 0
+        progress(finished, len(tasks))
 
     with engine(jobs, cluster) as on:
         measured = partial(_measured, folder=folder, indent=indent)

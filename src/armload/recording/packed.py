@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from armload.errors import RecordingError
+from armload.runtime.atomic import FULL
 
 _STREAMS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
 _ZIP = ".zip"
@@ -49,7 +50,7 @@ def unpacked(path: Path, forms: Collection[str]) -> Iterator[Path]:
         forms: the suffixes of logs; what else is packed stays as it is, for its reader to refuse.
 
     Raises:
-        RecordingError: it is damaged, or an archive of several logs, or of none.
+        RecordingError: it is damaged, or an archive of several logs, or of none, or there is no room for what is in it.
     """
     suffix = path.suffix.lower()
     if suffix not in UNPACKED or not path.is_file() or (suffix != _ZIP and form_of(path, forms) not in forms):
@@ -59,6 +60,10 @@ def unpacked(path: Path, forms: Collection[str]) -> Iterator[Path]:
         try:
             copy = _unpack(path, suffix, Path(folder), forms)
         except _FLAWS as error:
+            if isinstance(error, OSError) and error.errno in FULL:
+                where = Path(folder).parent
+                advice = "free some room there, or name another folder with TMPDIR"
+                raise RecordingError(f"{path} cannot be unpacked into {where}: {error.strerror}; {advice}") from error
             what = error.strerror if isinstance(error, OSError) and error.strerror else error
             raise RecordingError(f"{path} cannot be unpacked: {what}; unpack by hand what is whole of it") from None
         yield copy

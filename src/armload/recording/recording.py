@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 # What a torque column can mean; "measured" is the contract: rigid body + friction, gravity included.
 CHANNELS = ("measured", "desired", "external")
 # [s] since 1970 from which a log's clock is taken for the time of day, and not for the time since something began:
-# September 2001
-_CLOCK = 1e9
+# September 2001; and up to which: a time after the year 9999, which `datetime` cannot say, is of a clock that is wrong
+_CLOCK, _LAST = 1e9, 253_402_300_800.0
 GAP = 0.1  # [s] a longer pause between samples ends whatever has a memory of those before it
 _MANY = 1 << 18  # samples whose steps say the rate of a longer log: known to 0.3 % of their spread
 BLOCK = 4096  # samples that are worked on at a time: bounds the memory of what is made of them
@@ -132,9 +132,9 @@ class Recording:
 
     @property
     def date(self) -> float | None:
-        """Time of day of the first sample [s since 1970]; None: the clock counts from something else."""
+        """Time of day of the first sample [s since 1970]; None: the clock counts from something else, or is wrong."""
         began = self.epoch + float(self.t[0])
-        return began if began > _CLOCK else None
+        return began if _CLOCK < began < _LAST else None
 
     @property
     def n(self) -> int:

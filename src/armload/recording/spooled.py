@@ -10,9 +10,10 @@ import os
 import tempfile
 import weakref
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from armload.errors import RecordingError
 from armload.recording.aliases import QUANTITIES
 from armload.recording.recording import BLOCK, Recording
+from armload.runtime.atomic import FULL
 
 
 class _File:
@@ -28,7 +30,23 @@ class _File:
     def __init__(self, folder: str | Path | None) -> None:
         self.number, path = tempfile.mkstemp(prefix="armload-", dir=folder)
         os.unlink(path)
+        self._folder = os.path.dirname(path)
         weakref.finalize(self, os.close, self.number)
+
+    @contextmanager
+    def writer(self) -> Iterator[IO[bytes]]:
+        """What is written within comes to stand in the file.
+
+        Raises:
+            OSError: there is no room in the folder, which it names.
+        """
+        try:
+            with open(self.number, "wb", closefd=False) as writer:
+                yield writer
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            raise OSError(error.errno, error.strerror, self._folder) from None
 
     def rows(self, start: int, stop: int, width: int) -> NDArray[np.float64]:
         """Some rows (stop − start, width), read and not mapped: a process's pages of a file count as its memory."""
@@ -117,7 +135,7 @@ class SpooledRecording(Recording):
     def with_velocities(self, parts: Iterable[NDArray[np.float64]]) -> Recording:
         """The same with other velocities, which lie on disk, too."""
         file = _File(None)
-        with open(file.number, "wb", closefd=False) as writer:
+        with file.writer() as writer:
             for part in parts:
                 writer.write(part.tobytes())
         dq: Any = OnDisk(file, self.n, slice(0, self.n), slice(0, len(self)))
@@ -137,10 +155,10 @@ def spooled(chunks: Iterable[Recording], where: str, folder: str | Path | None =
         folder: where its samples lie meanwhile, 24 bytes for each joint and sample; None: the system's own.
 
     Raises:
-        RecordingError: there are no chunks. OSError: the folder is full.
+        RecordingError: there are no chunks. OSError: the folder, which it names, is full.
     """
     file, times, last = _File(folder), [], None
-    with open(file.number, "wb", closefd=False) as writer:
+    with file.writer() as writer:
         for last in chunks:
             writer.write(np.hstack([last.q, last.dq, last.tau]).tobytes())
             times.append(last.t)

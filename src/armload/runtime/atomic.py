@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _STREAMS = re.compile(r"/proc/|/dev/(fd/|std(in|out|err)$)")  # open already, even where a plain file is behind it
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a write, which names no file
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # of a write for which there is no room, and which names no file
 _AGAIN = 0.05  # [s] between two looks at a lock
 _WRITERS = 8  # of one file at once, each with a name of its own; there is no limit, but more have names by chance
 
@@ -53,7 +53,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
             temporary.replace(target)
             left = False  # and the name is free for others
     except OSError as error:
-        if error.filename != str(temporary) and not (error.filename is None and error.errno in _FULL):
+        if error.filename != str(temporary) and not (error.filename is None and error.errno in FULL):
             raise
         raise _named(error, path) from None
     finally:

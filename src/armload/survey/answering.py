@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from armload.errors import ArmloadError, EpisodesError, RecordingError, one_line
 from armload.identification import identify
+from armload.runtime.atomic import FULL
 from armload.runtime.version import __version__
 from armload.survey.content import NO_FILE, is_special
 from armload.survey.logs import Log
@@ -84,6 +85,8 @@ def _rows(log: Log, settings: Settings, about: dict[str, Any]) -> list[dict[str,
         why = "too little memory for it: the next run of the survey tries it again; give that fewer processes (--jobs)"
         raise _Unread(f"{log.name}: {why}") from None
     except Exception as error:
+        if _of_machine(error):
+            raise _Unread(f"{_reason(error)}: the next run of the survey tries it again") from None
         return [unusable(_reason(error), about)]
 
 
@@ -93,6 +96,8 @@ def _of_episode(log: Log, settings: Settings, path: Path, about: dict[str, Any])
     except MemoryError:  # of the whole log
         raise
     except Exception as error:
+        if _of_machine(error):
+            raise
         return [unusable(_reason(error), about)]
 
 
@@ -118,9 +123,21 @@ def _of_one(log: Log, settings: Settings, path: Path, about: dict[str, Any]) -> 
     return rows
 
 
+def _of_machine(error: BaseException | None) -> bool:
+    """Whether the system could not do something just now, which says nothing of the log; it has a number for each."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno is not None:
+            return True
+        error = error.__context__
+    return False
+
+
 def _reason(error: Exception) -> str:
     if isinstance(error, ArmloadError):
         return str(error)
+    if isinstance(error, OSError) and error.errno in FULL:
+        why = f"{error.filename or 'the disk'} has no room for its samples: {error.strerror}"
+        return f"{why}; free some there, or name another folder with TMPDIR"
     if isinstance(error, OSError):
         return f"{error.filename or 'the log'} cannot be read: {error.strerror or one_line(error)}"
     return f"{type(error).__name__}: {one_line(error)}; this is a bug in armload: identify the log alone to see where"

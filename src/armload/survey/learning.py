@@ -82,16 +82,16 @@ def _of_arm(
     later = stretches[FIRST:]
     step = max(-(-len(later) // (MOST - FIRST)), 1)
     chosen = [*stretches[:FIRST], *later[::step]]
-    about = folder / f"{arm}.json"
+    path, about = (Path(f"{folder}/{arm}{suffix}") for suffix in (".profile", ".json"))  # where `{arm}` is looked for
     key = key_of([[row["key"], row["t0"], row["t1"]] for row in chosen])
     before = _learned_from(about, key)
-    if before is not None and (folder / f"{arm}.profile").is_file():
+    if before is not None and path.is_file():
         return f"as before, of {before} stretches"
     say(f"learning the profile of {arm} from {len(chosen)} stretches")
     profile, learned, left_out = _learned(chosen, settings)
     if profile is None:
         return f"none, as no stretch could be used ({left_out[0]['reason']})"
-    save_profile(profile, folder / f"{arm}.profile")
+    save_profile(profile, path)
     with replacing(about) as temporary:
         whole = {"key": key, "learned_from": learned, "left_out": left_out}
         temporary.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")

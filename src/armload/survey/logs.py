@@ -1,5 +1,8 @@
 """Which logs there are: files, folders, globs, lists and object stores become units of work, each known by its content.
 
+What lies behind a path is asked of `os.path`, to which a path that cannot be asked (no access, a name too long, a loop
+of links) is not there: its row says why. `Path` would raise, and end the survey.
+
 A unit is what is answered at a time and what an interruption loses at most: a log file, a ROS 2 bag's folder, or an
 episode of a LeRobot data set.
 """
@@ -54,7 +57,7 @@ class Log:
     @property
     def there(self) -> bool:
         """Whether any of its files is there; of an object nobody knows before it is fetched."""
-        return self.remote or self.episode is not None or any(file.exists() for file in self.files)
+        return self.remote or self.episode is not None or any(os.path.exists(file) for file in self.files)
 
     def stamp(self) -> str:
         """What changes with the content and is known without reading it: sizes and times, or the store's own key.
@@ -157,15 +160,17 @@ def _arm(name: str, pattern: re.Pattern[str] | None) -> str:
 def _in_bag(name: str) -> bool:
     """Whether this is a file of a ROS 2 bag's folder."""
     path = Path(name)
-    return is_part_of_bag(path) or (path.suffix.lower() in PART_SUFFIXES and (path.parent / "metadata.yaml").is_file())
+    return is_part_of_bag(path) or (
+        path.suffix.lower() in PART_SUFFIXES and os.path.isfile(path.parent / "metadata.yaml")
+    )
 
 
 def _is_bag(folder: Path, inside: Sequence[Path]) -> bool:
     """Whether this is the folder of a ROS 2 bag: by its metadata or, where these are lost, the names of its files."""
-    if (folder / "metadata.yaml").is_file():
+    if os.path.isfile(folder / "metadata.yaml"):
         return True
-    logs = [path for path in inside if not path.name.startswith(".") and (path.is_dir() or is_log(path))]
-    return bool(logs) and all(is_part_of_bag(path) and path.is_file() for path in logs)
+    logs = [path for path in inside if not path.name.startswith(".") and (os.path.isdir(path) or is_log(path))]
+    return bool(logs) and all(is_part_of_bag(path) and os.path.isfile(path) for path in logs)
 
 
 def _expanded(paths: Sequence[str], passed: set[str], within: tuple[str, ...] = ()) -> Iterator[str]:
@@ -178,7 +183,7 @@ def _expanded(paths: Sequence[str], passed: set[str], within: tuple[str, ...] = 
             yield from _expanded(_lines(here), passed, (*within, real))
         elif is_url(path):
             yield from logs_in(path, passed)
-        elif WILD.search(path) and not Path(path).exists():
+        elif WILD.search(path) and not os.path.exists(path):
             yield from sorted(glob.glob(path, recursive=True))
         else:
             yield path
@@ -187,9 +192,12 @@ def _expanded(paths: Sequence[str], passed: set[str], within: tuple[str, ...] = 
 def _lines(file: Path) -> list[str]:
     """What a list names, without comments (#); a mark of the byte order, which Windows writes, is not in the first."""
     try:
-        lines = [line.strip() for line in file.read_text(encoding="utf-8-sig").splitlines()]
+        text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"the list {file} cannot be read: {error}") from None
+    if "\0" in text:
+        raise UsageError(f"the list {file} holds bytes of zero, as of find -print0: expected one path on each line")
+    lines = [line.strip() for line in text.splitlines()]
     return [line for line in lines if line and not line.startswith("#")]
 
 
@@ -202,20 +210,20 @@ def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[Log]:
     here = Path(path)
     if is_url(path):
         yield Log(path)
-    elif not here.is_dir() or (inside := _inside(here)) is None:
+    elif not os.path.isdir(here) or (inside := _inside(here)) is None:
         yield Log(path, files=(here,))
     elif is_data_set(here):
         yield from _episodes(here)
     elif _is_bag(here, inside):
-        yield Log(str(here), files=tuple(file for file in inside if file.is_file()))
+        yield Log(str(here), files=tuple(file for file in inside if os.path.isfile(file)))
     elif (real := os.path.realpath(here)) not in hidden:
         hidden.add(real)
         for inner in inside:
             if inner.name.startswith(".") or os.path.realpath(inner) in hidden or of_survey(inner):
                 continue
-            if inner.is_dir() or (is_log(inner) and not is_special(inner)):
+            if os.path.isdir(inner) or (is_log(inner) and not is_special(inner)):
                 yield from _units(str(inner), hidden, passed)
-            elif inner.is_file() and may_be_log(inner):
+            elif os.path.isfile(inner) and may_be_log(inner):
                 passed.add(str(inner))
 
 
@@ -230,7 +238,7 @@ def _inside(folder: Path) -> list[Path] | None:
 def of_survey(path: Path) -> bool:
     """Whether this is the table of a survey, or its folder of cells (`cells_of`)."""
     table = path.with_suffix("") if path.suffix == ".cells" else path
-    return table.is_file() and cells_of(table).is_dir()
+    return os.path.isfile(table) and os.path.isdir(cells_of(table))
 
 
 def _episodes(folder: Path) -> Iterator[Log]:

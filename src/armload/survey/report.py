@@ -89,9 +89,9 @@ def _what_to_do(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], 
             str(f.unusable),
             str(f.payloads),
             "" if f.mass is None else f"{f.mass:.3f}",
-            _share(f.changed, (f.changed or 0.0) >= SHARE_CHANGED),
+            _share(f.changed, f.retare and (f.changed or 0.0) >= SHARE_CHANGED),
             "" if f.shift is None else f"{f.shift.z:.1f}{' !' if f.shift.found else ''}",
-            _share(f.moves, (f.moves or 0.0) >= SHARE_MOVES),
+            _share(f.moves, f.loose and (f.moves or 0.0) >= SHARE_MOVES),
             "" if f.slide is None else f"{f.slide.z:.1f}{' !' * f.slide.found}",
             _since(f),
         )
@@ -112,7 +112,7 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
     dated = are_dated(held)
     with look():
         over_time = new_figure(4.2)
-        ax = over_time.subplots()
+        ax, drawn = over_time.subplots(), []
         for k, finding in enumerate(findings):
             of = [row for row in held if row["arm"] == finding.arm]
             x, mass = times_of(of, dated), np.array([row["mass"] for row in of])
@@ -123,12 +123,15 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
                 "markersize": 3.5,
                 "elinewidth": 0.7,
             }
-            ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], label=finding.arm, alpha=0.75, **style)
+            drawn.append(ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], alpha=0.75, **style))
             mark(ax, x, 9)
         ax.set_xlabel(time_label(held, dated))
         ax.set_ylabel("mass [kg]")
         if len(findings) <= 30:
-            over_time.legend(*ax.get_legend_handles_labels(), loc="outside right upper", fontsize=8)
+            # matplotlib leaves out what has a label that begins with an underscore, as an arm's name may
+            unnamed = over_time.legend(drawn, ["arm"] * len(drawn), loc="outside right upper", fontsize=8)
+            for label, finding in zip(unnamed.get_texts(), findings, strict=True):
+                label.set_text(finding.arm)
         histogram = new_figure(2.6)
         ax = histogram.subplots()
         ax.hist([row["mass"] for row in held], bins="auto", color=COLOURS[0], edgecolor="white")
@@ -147,6 +150,8 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
 
 def _arms(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding], n: int) -> Section:
     """Offsets and friction, a panel for each arm, over time."""
+    if not any(row["status"] == ANSWERED for row in rows):
+        return Section("Drift of the arms", "No log was answered.")
     shown = sorted(findings, key=lambda f: not f.advice)[:_MOST_ARMS]
     figures = []
     for name, what in (("offset", "Torque offset"), ("coulomb", "Coulomb friction")):

@@ -6,7 +6,7 @@ import csv
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from armload.errors import UsageError
 from armload.runtime.atomic import replacing
@@ -43,9 +43,7 @@ def write_rows(path: str | Path, rows: Sequence[dict[str, Any]], n: int) -> None
             _write_parquet(temporary, rows, kinds)
         elif suffix == ".csv":
             with temporary.open("w", encoding="utf-8", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(kinds)
-                writer.writerows([_cell(row[name]) for name in kinds] for row in rows)
+                _write_csv(file, rows, kinds)
         else:
             temporary.write_text(json.dumps(rows, indent=0, allow_nan=False) + "\n", encoding="utf-8")
 
@@ -69,6 +67,8 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
                 rows = list(csv.DictReader(file))
         else:
             rows = json.loads(path.read_text(encoding="utf-8"))
+        if not rows:
+            raise ValueError("it has no rows")
         n = sum(name.startswith(_JOINTS) for name in rows[0])
         kinds = columns(n)
         if not set(rows[0]) >= _OF_SURVEY:
@@ -120,6 +120,16 @@ def _write_parquet(path: Path, rows: Sequence[dict[str, Any]], kinds: dict[str, 
     parquet.write_table(pa.Table.from_arrays(made, schema=schema), path, compression="zstd")
 
 
+def _write_csv(file: TextIO, rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> None:
+    """Lines that end as on Unix; a carriage return, which a file's name may have, would end one where it is bare."""
+    plain = csv.writer(file, lineterminator="\n")
+    quoted = csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL)
+    plain.writerow(kinds)
+    for row in rows:
+        cells = [_cell(row[name]) for name in kinds]
+        (quoted if any("\r" in cell for cell in cells) else plain).writerow(cells)
+
+
 def whole(value: Any) -> Any:
     """A value that every form can hold: a path whose bytes are no UTF-8 has them written out, as \\xff."""
     if isinstance(value, str):
@@ -127,10 +137,10 @@ def whole(value: Any) -> Any:
     return value
 
 
-def _cell(value: Any) -> Any:
+def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
-    return repr(value) if isinstance(value, float) else "" if value is None else value
+    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
 
 
 def _read(cell: str, kind: str) -> Any:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armload.app.cli.printing import print_note
-from armload.errors import UsageError
+from armload.errors import ArmError, UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -32,14 +32,23 @@ def arm_of(options: argparse.Namespace) -> Arm:
 
 
 def arm_of_dataset(dataset: Dataset, robot: str | None) -> Arm:
-    """The arm a data set was made with; `robot` names it where it is not a built-in one."""
+    """The arm a data set was made with; `robot` names it where it is not a built-in one.
+
+    Raises:
+        UsageError: what is named, or built in under the data set's name, is another arm, or there is none.
+    """
     from armload.arms import arm
 
     about = dataset.provenance["arm"]
-    made_with = arm(robot or about["name"], about["frame"], tuple(about["gravity"]))
-    if made_with.fingerprint != about["fingerprint"]:
-        raise UsageError(f"{dataset.path} was made with another {about['name']}: name its URDF with --robot")
-    return made_with
+    made_with = f"{dataset.path} was made with the arm {about['name']} about {about['frame']}"
+    try:
+        found = arm(robot or about["name"], about["frame"], tuple(about["gravity"]))
+    except ArmError as error:
+        raise UsageError(f"{made_with}, which --robot has to name ({error})") from None
+    if found.fingerprint != about["fingerprint"]:
+        another = f"--robot {robot}" if robot else f"the built-in {about['name']}"
+        raise UsageError(f"{made_with}, and {another} is another one: name its own description with --robot")
+    return found
 
 
 def payload_named(name: str, arm: Arm | None = None) -> Payload:

@@ -19,6 +19,9 @@ from armload.runtime.atomic import replacing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# control characters, as the name of a file may have, of which XML has none (XML 1.0, 2.2): no browser would draw it
+_NO_XML = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+
 
 @dataclass(frozen=True)
 class Section:
@@ -101,7 +104,8 @@ def _picture(figure: Figure) -> str:
     buffer = io.BytesIO()
     with look():
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+    drawn = _NO_XML.sub("\ufffd".encode(), buffer.getvalue())
+    return "data:image/svg+xml;base64," + base64.b64encode(drawn).decode("ascii")
 
 
 def _anchor(title: str) -> str:

@@ -34,6 +34,7 @@ _LOOK: dict[Any, Any] = {
     "legend.fontsize": 9,
     "lines.linewidth": 1.6,
     "figure.facecolor": "white",
+    "text.parse_math": False,  # a name of a file or folder is no formula, whatever it holds
     "svg.hashsalt": "armload",  # the same comparison gives the same file
     "svg.fonttype": "path",
 }
