@@ -17,7 +17,7 @@ from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.server import PageServer, look_at_middle, look_from
 from armload.app.page.status import Status, Watcher
-from armload.app.page.style import AWAKE, SHEET, SOFT, TEXT, heard, unheard
+from armload.app.page.style import SHEET, SOFT, TEXT, awake, heard, unheard
 from armload.arms import Arm, rated_mass
 from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
@@ -172,7 +172,7 @@ class Page:
 
     def _build_panel(self, gui: Any) -> None:
         session = self.session
-        gui.add_html(SHEET + AWAKE)
+        gui.add_html(SHEET + awake(self._page.label))
         self._headline = gui.add_html(tables.headline(None))
         self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
         self._status = gui.add_html("")

@@ -34,7 +34,7 @@ class PageServer:
             on this machine. otherwise: what whoever has no viser can do instead of installing it.
 
     Attributes:
-        viser: viser's own server. url: where to find the page, with the token that lets in.
+        viser: viser's own server. label: title of the page. url: where to find the page, with the token that lets in.
 
     Raises:
         UsageError: viser is not installed, or there is no such interface.
@@ -43,6 +43,7 @@ class PageServer:
     def __init__(
         self, host: str, port: int, label: str, token: str | None = None, otherwise: str = "use --headless"
     ) -> None:
+        self.label = label
         try:
             viser: Any = importlib.import_module("viser")
         except ImportError:
