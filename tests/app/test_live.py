@@ -818,6 +818,18 @@ def test_a_page_without_viser_says_what_to_install(held, monkeypatch):
         Page(held)
 
 
+def test_a_page_goes_on_whatever_time_span_a_client_sends(held):
+    pytest.importorskip("viser")
+    page = Page(held, port=0)
+    try:
+        page._span.value = "nonsense"
+        page.show()
+        t, *_ = page._plots[0].data
+        assert len(t) == len(held.history.last(30.0)[0])
+    finally:
+        page.close()
+
+
 def test_a_page_on_an_interface_that_is_not_there_is_refused(held):
     pytest.importorskip("viser")
     with pytest.raises(UsageError, match="no page can be served"):

@@ -5,6 +5,7 @@ viser keeps its state, so that a page that is opened later shows the same.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from html import escape
@@ -79,7 +80,7 @@ class MotionPage:
     def go_on(self, seconds: float) -> None:
         """Show the motion so many seconds later, if it runs: after its end it rests, and begins again."""
         if self._runs.value:
-            self._at += SPEEDS[self._speed.value] * seconds
+            self._at += SPEEDS.get(self._speed.value, 1.0) * seconds  # a client may send any text
             if self._at > self._motion.duration + _REST:
                 self._at = 0.0
             self.show(self._at)
@@ -130,7 +131,7 @@ class MotionPage:
 
         @self._time.on_update
         def _(event: Any) -> None:
-            if event.client is not None:  # else we set it ourselves
+            if event.client is not None and math.isfinite(event.target.value):  # else we set it ourselves
                 self._runs.value = False
                 self._at = float(event.target.value)
                 self.show(self._at)
