@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import logging
 import math
 import secrets
 import socket
@@ -54,6 +55,8 @@ class PageServer:
             socket.create_server((host, 0), family=family).close()  # viser would try one port after another, for ever
         except OSError as error:
             raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
+        # what a stranger's request is not is told with a traceback, where a terminal shows what armload says
+        logging.getLogger("websockets").setLevel(logging.CRITICAL)
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser = viser.ViserServer("127.0.0.1", 0, label, verbose=False)
         # the page leaves this machine only if somebody forwards it
