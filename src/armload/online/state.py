@@ -68,7 +68,9 @@ def saved_at(path: str | PathLike[str]) -> float:
     with _opened(path) as (text, _):
         saved = float(text["saved"])
         if not math.isfinite(saved):
-            raise ValueError(f"it was saved at {saved}, expected seconds since 1970")
+            raise IdentificationError(
+                f"{path} says that it was saved at {saved}, expected seconds since 1970: begin without it"
+            )
         return saved
 
 
