@@ -100,6 +100,15 @@ def test_a_bad_csv_is_refused_by_place(refused, log_text, tmp_path, change, name
         assert word in text
 
 
+@pytest.mark.parametrize("evil", ["\x1b[2J\x1b[1;1H", "\a\b\x7f", "\u202e", "\x9b31m"])
+def test_a_name_from_a_file_gives_the_terminal_no_orders(refused, tmp_path, evil):
+    path = tmp_path / "log.csv"
+    path.write_text(f"time,{evil}q1\n0,1\n1,2\n", encoding="utf-8")
+    for text in (refused(path, *ROBOT), refused(tmp_path / f"{evil}.csv", *ROBOT)):
+        assert text.strip().isprintable()
+        assert repr(evil)[1:-1].lower() in text.lower()
+
+
 def test_a_log_of_another_arm_is_refused(refused, log_text, tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(log_text)

@@ -5,10 +5,14 @@ import json
 import math
 import re
 import signal
+import socket
 import subprocess
 import sys
+import urllib.request
+from contextlib import suppress
 from pathlib import Path
 from time import sleep
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -816,6 +820,36 @@ def test_a_page_without_viser_says_what_to_install(held, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(UsageError, match=r"the page needs viser.*pip install .*viser>="):
         Page(held)
+
+
+def test_a_page_goes_on_whatever_time_span_a_client_sends(held):
+    pytest.importorskip("viser")
+    page = Page(held, port=0)
+    try:
+        page._span.value = "nonsense"
+        page.show()
+        t, *_ = page._plots[0].data
+        assert len(t) == len(held.history.last(30.0)[0])
+    finally:
+        page.close()
+
+
+@pytest.mark.parametrize("more", [b"GET / HTTP/1.1\r\n\r\n", b"\x16\x03\x01"])
+def test_what_a_stranger_sends_is_no_traceback_of_ours(held, more, caplog):
+    pytest.importorskip("viser")
+    page = Page(held, port=0)
+    try:
+        port = urlsplit(page.url).port
+        with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stranger:
+            stranger.sendall(b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 5\r\n\r\n" + more)
+            with suppress(ConnectionError):
+                while stranger.recv(4096):
+                    pass
+        with urllib.request.urlopen(page.url, timeout=10.0) as answer:
+            assert answer.status == 200
+    finally:
+        page.close()
+    assert [record for record in caplog.records if record.name.startswith("websockets")] == []
 
 
 def test_a_page_on_an_interface_that_is_not_there_is_refused(held):

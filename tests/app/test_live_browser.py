@@ -171,7 +171,7 @@ def test_numbers_move_and_approach_the_truth(served, tab):
     assert "truth: 1.480 kg" in text(tab, "truth")
     assert "grasp" in until(lambda: "grasp" in text(tab, "log") and text(tab, "log"))
     assert "samples" in text(tab, "health")
-    assert float(tab.locator("[data-armload=phi0] td").nth(1).inner_text()) == pytest.approx(later[0], abs=0.05)
+    assert float(tab.locator("[data-armload=phi0] td").first.inner_text()) == pytest.approx(later[0], abs=0.05)
     assert session.error is None
 
 
@@ -425,6 +425,7 @@ def test_in_a_browser_the_motion_runs_and_stands_still_when_it_is_told_to(panda,
     server.start()
     try:
         with open_browser(page.url, complaints, strangers) as tab:
+            assert tab.title() == "armload · taie2024"
             seen = {tab.locator("[data-armload=state]").inner_text()}
             for _ in range(300):
                 seen.add(tab.locator("[data-armload=state]").inner_text())
@@ -443,6 +444,30 @@ def test_in_a_browser_the_motion_runs_and_stands_still_when_it_is_told_to(panda,
         server.join(timeout=60)
     assert complaints == []
     assert strangers == []
+
+
+_CONTRAST = """e => {
+  const light = text => text.match(/[\\d.]+/g).slice(0, 3).map(x => x / 255)
+    .map(x => x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, x, k) => sum + x * [0.2126, 0.7152, 0.0722][k], 0);
+  const solid = text => !/, 0\\)|transparent/.test(text);
+  let on = e;
+  while (on.parentElement && !solid(getComputedStyle(on).backgroundColor)) on = on.parentElement;
+  const ground = getComputedStyle(on).backgroundColor;
+  const both = [light(getComputedStyle(e).color), solid(ground) ? light(ground) : 1].sort();
+  return (both[1] + 0.05) / (both[0] + 0.05); }"""  # WCAG 2.2, 1.4.3
+
+
+def test_a_page_has_the_title_of_its_arm_and_its_buttons_can_be_read(served, tab):
+    session, *_ = served
+    assert tab.title() == f"armload · {session.source.name}"
+    for scheme in ("light", "dark"):
+        tab.evaluate("x => document.documentElement.setAttribute('data-mantine-color-scheme', x)", scheme)
+        tab.wait_for_timeout(500)  # a colour changes in steps
+        for words in ("Start anew", "Tare", "Take up", "Put down", "Download", "Curves"):
+            found = tab.get_by_text(words, exact=True).first.evaluate(_CONTRAST)
+            assert found >= 4.5, (scheme, words)
+    tab.evaluate("document.documentElement.setAttribute('data-mantine-color-scheme', 'light')")
 
 
 @pytest.mark.usefixtures("tab")

@@ -1,6 +1,7 @@
 """The page of a motion: the arm stands where the motion says, among what stands around."""
 
 import urllib.request
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -49,6 +50,14 @@ def test_a_motion_goes_on_rests_and_begins_again(page):
     assert "t = 6.00 s" in page.numbers.content
     page.go_on(1.0)
     assert "t = 0.00 s" in page.numbers.content
+
+
+def test_a_motion_goes_on_whatever_a_client_sends(page):
+    page._speed.value = "nonsense"
+    (moved,) = page._time._impl.update_cb
+    moved(SimpleNamespace(client=object(), target=SimpleNamespace(value=float("nan"))))
+    page.go_on(1.5)
+    assert "t = 1.50 s" in page.numbers.content
 
 
 def test_the_page_is_served_and_a_motion_of_another_arm_is_refused(page):

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from html import escape
+from html.parser import HTMLParser
 from time import monotonic, sleep
 
 import numpy as np
@@ -11,9 +12,10 @@ import pytest
 from armload.app.page import tables
 from armload.app.page.page import Page
 from armload.app.page.status import Watcher, waits_for
-from armload.app.page.style import GOOD, SHEET, WAIT
+from armload.app.page.style import GOOD, SHEET, WAIT, awake
 from armload.devices import Replay, Simulator, Source, open_source
 from armload.errors import SourceError
+from armload.inertia import NAMES
 from armload.online import Event
 from armload.payloads import test_payload
 from armload.service import Session, Unknown
@@ -150,10 +152,25 @@ def _luminance(colour):
 def test_grey_and_coloured_words_can_be_read(scheme, ground):
     rules = SHEET.split(f'scheme="{scheme}"] {{')[1].split("}")[0]
     colours = re.findall(r"#[0-9a-f]{6}", rules)
-    assert len(colours) == 4
+    assert len(colours) == 5
     for colour in colours:
         light, dark = sorted((_luminance(colour), _luminance(ground)), reverse=True)
         assert (light + 0.05) / (dark + 0.05) >= 4.5, colour
+
+
+def test_the_title_of_a_page_is_text_whatever_an_arm_is_called():
+    tags, parser, title = [], HTMLParser(), '"><img src=x onerror="alert(1)">\''
+    parser.handle_starttag = lambda tag, attributes: tags.append((tag, dict(attributes)))
+    parser.feed(awake(title))
+    ((_, found),) = tags
+    assert found["data-title"] == title
+    assert found["onerror"].endswith("document.title=this.dataset.title")
+
+
+def test_each_row_of_numbers_is_headed_by_its_parameter(seen):
+    """A screen reader says the head of a row with each number in it."""
+    heads = re.findall(r'<th scope="row"[^>]*>([^<]*)</th>', tables.parameters(seen.estimate))
+    assert heads == list(NAMES)
 
 
 def test_a_robot_that_is_lost_is_waited_for_and_why_is_said(lost):

@@ -188,3 +188,15 @@ def test_a_port_that_is_taken_is_followed_by_the_next_free_one(door):
 def test_an_interface_that_is_not_there_is_refused():
     with pytest.raises(UsageError, match="no page can be served"):
         TokenDoor("203.0.113.7", 0, 1, TOKEN)
+
+
+def test_a_door_that_closes_while_somebody_looks_on_says_nothing(caplog):
+    with socket.create_server(("127.0.0.1", 0)) as behind:  # it takes requests, and lets them wait
+        door = TokenDoor("127.0.0.1", 0, behind.getsockname()[1], None)
+        with socket.create_connection(("127.0.0.1", door.port), timeout=10.0) as guest:
+            guest.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            through, _ = behind.accept()
+            with through:
+                assert through.recv(100).startswith(b"GET")
+                door.close()
+    assert caplog.records == []

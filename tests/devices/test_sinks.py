@@ -472,9 +472,31 @@ def test_names_cannot_break_a_description(form):
     assert root.find(".//evil") is None
 
 
+@pytest.mark.parametrize("hyphens", [2, 3, 4, 5])
+def test_hyphens_of_a_frame_end_no_comment(hyphens):
+    root = ET.fromstring(export_load(Load(skew_body("a" + "-" * hyphens)), "urdf"))
+    assert root.find("joint/parent").get("link") == "a" + "-" * hyphens
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("character", ["\x1b", "\0", "\ud800", "\uffff"])
+def test_a_name_or_frame_that_no_xml_holds_is_refused_by_it(form, character):
+    with pytest.raises(SinkError, match=r"the frame is 'a.*expected letters and digits"):
+        export_load(Load(skew_body(f"a{character}")), form)
+    with pytest.raises(SinkError, match=r"the name is 'b.*expected letters and digits"):
+        export_load(Load(skew_body("a")), form, name=f"b{character}")
+
+
 def test_a_robot_s_name_cannot_break_out_of_a_comment():
     text = export_load(Load(skew_body(), robot="x\nimport os"), "franka")
     assert [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import)] == []
+
+
+def test_a_line_s_end_as_java_writes_it_ends_no_comment():
+    """Java reads it before it reads comments (The Java Language Specification, 3.3)."""
+    text = export_load(Load(skew_body("x\\u000aSystem.exit(0); //")), "kuka")
+    assert "\\" not in text
+    assert "x/u000aSystem.exit(0); //" in text.splitlines()[0]
 
 
 def test_what_was_measured_minus_the_hand():

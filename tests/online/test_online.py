@@ -515,7 +515,7 @@ def test_a_state_of_an_earlier_format_is_refused(panda, online, log, tmp_path):
     del text["origin"]  # where format 1 had none
     arrays["tree"] = np.frombuffer(json.dumps({**text, "format": 1}).encode(), dtype=np.uint8)
     np.savez(path, **arrays)
-    with pytest.raises(IdentificationError, match="another version of armload: begin anew"):
+    with pytest.raises(IdentificationError, match="another version of armload: begin without it"):
         OnlineIdentifier.restore(path, panda)
 
 

@@ -1,6 +1,8 @@
 """Alarms: one for each episode, told to a receiver that may be away."""
 
+import contextlib
 import json
+import socket
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -9,6 +11,7 @@ import pytest
 
 from armload.errors import UsageError
 from armload.service import Alarms, Webhook
+from armload.service import webhook as webhook_module
 from armload.service.alarms import CLEARED_AFTER, RAISED_AFTER
 
 
@@ -188,6 +191,43 @@ def test_an_answer_that_is_no_http_is_said_and_alarms_go_on(receiver, caplog):
     webhook.close()
     assert [message["number"] for message, _ in taken] == [0]
     assert caplog.messages == ["the webhook did not answer: garbage", "the webhook takes alarms again"]
+
+
+@contextlib.contextmanager
+def dribbling():
+    """A receiver that begins its first answer and never ends it, and then takes what comes; the second is whole."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        taken = []
+
+        def serve():
+            with contextlib.suppress(OSError):
+                first, _ = server.accept()
+                threading.Thread(target=dribble, args=(first,), daemon=True).start()
+                second, _ = server.accept()
+                with second:
+                    taken.append(second.recv(65536))
+                    second.sendall(b"HTTP/1.0 200 OK\r\nContent-Length: 0\r\n\r\n")
+
+        def dribble(connection):
+            with connection, contextlib.suppress(OSError):
+                connection.sendall(b"HTTP/1.0 200 OK\r\nX: ")
+                while True:
+                    connection.sendall(b"x")
+                    time.sleep(0.02)
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"http://127.0.0.1:{server.getsockname()[1]}/", taken
+
+
+def test_a_receiver_that_answers_byte_by_byte_without_an_end_is_asked_again(monkeypatch, caplog):
+    monkeypatch.setattr(webhook_module, "_ANSWERED", 0.3)
+    with dribbling() as (url, taken):
+        webhook = Webhook(url)
+        webhook.post({"k": 7})
+        until(lambda: webhook.sent == 1)
+        webhook.close()
+    assert b'{"k": 7}' in taken[0]
+    assert "did not answer: timed out" in caplog.text
 
 
 def test_what_waits_for_a_dead_receiver_is_bounded():

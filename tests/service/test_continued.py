@@ -1,6 +1,7 @@
 """A process that goes on from a saved state: what was held then may have been exchanged since."""
 
 import json
+import math
 import resource
 import select
 import time
@@ -51,7 +52,9 @@ def test_what_a_saved_state_holds_is_unconfirmed_until_a_second_has_told(panda, 
     assert {line["unknown"] for line in answers[:-1]} <= {"unconfirmed", "behind", "silent"}
 
 
-@pytest.mark.parametrize(("ago", "goes_on"), [(1800.0, True), (3 * 86400.0, False), (-3 * 86400.0, False)])
+@pytest.mark.parametrize(
+    ("ago", "goes_on"), [(1800.0, True), (3 * 86400.0, False), (-3 * 86400.0, False), (math.nan, False)]
+)
 def test_a_state_is_gone_on_from_while_the_arm_is_that_of_the_same_session(
     ago, goes_on, panda, analytic_log, tmp_path, monkeypatch
 ):
@@ -71,11 +74,31 @@ def test_a_state_is_gone_on_from_while_the_arm_is_that_of_the_same_session(
     process.source.close()
     assert (found is not None) == goes_on
     if found is None:
-        assert ("saved 3d ago" if ago > 0.0 else "nobody knows how old it is") in notes[0]
+        no_time = "saved at nan, expected seconds since 1970"
+        why = no_time if math.isnan(ago) else "saved 3d ago" if ago > 0.0 else "nobody knows how old it is"
+        assert why in notes[0]
         assert notes[0].endswith("begun anew")
     else:
         assert found.conclude().phi[0] == pytest.approx(identifier.conclude().phi[0])
         found.close()
+
+
+def test_a_state_of_another_version_is_said_to_be_that_and_the_stream_begins_anew(
+    panda, analytic_log, tmp_path, monkeypatch
+):
+    path = tmp_path / "run.csv"
+    write_recording(path, analytic_log(panda, duration=1.0))
+    settings = ArmSettings(name="left", source=str(path), robot="panda", method="map", save=str(tmp_path))
+    identifier = OnlineIdentifier(panda, method="map")
+    with monkeypatch.context() as earlier:
+        earlier.setattr("armload.online.state.FORMAT", 1)
+        identifier.save(settings.state)
+    identifier.close()
+    process, notes = ArmProcess(settings, 0.1, ()), []
+    monkeypatch.setattr(process, "note", notes.append)
+    assert process._restored(None) is None
+    process.source.close()
+    assert notes == [f"{settings.state} belongs to another version of armload: begun anew"]
 
 
 def test_what_is_known_of_payloads_counts_in_a_stream_that_begins_and_in_one_that_goes_on(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +17,8 @@ from armload.devices.ur.form import set_payload_text, set_target_payload_text
 from armload.devices.xarm.form import set_tcp_load_text
 from armload.errors import SinkError
 from armload.runtime.atomic import replacing
+
+_NO_TEXT = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, 2.2
 
 
 class Form(NamedTuple):
@@ -96,10 +99,16 @@ def export_load(load: Load, to: str, path: str | Path | None = None, name: str =
         name: name of the link, body or model in a description.
 
     Raises:
-        SinkError: an unknown form, a load that no body can have, or a file that cannot be written.
+        SinkError: an unknown form, a load that no body can have, a name or frame with a character that no XML holds,
+            or a file that cannot be written.
     """
     if to not in FORMS:
         raise SinkError(f"unknown form {to!r}: expected one of {', '.join(FORMS)}")
+    for what, called in (("name", name), ("frame", load.frame)):
+        if called is not None and _NO_TEXT.search(called):
+            raise SinkError(
+                f"the {what} is {called!r}, with a character that no XML holds: expected letters and digits"
+            )
     if not load.consistent:
         raise SinkError(
             "no body can have these parameters: take the nearest one, load.as_body(), or identify on a faster motion"

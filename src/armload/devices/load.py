@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -179,8 +180,7 @@ class Load:
         lines = [what, *[remarks_on.NOTHING_HELD] * self.seems_nothing]
         if self.undetermined:
             lines.append(f"not determined by the log: {', '.join(self.undetermined)}; known beforehand, not measured")
-        # each on one line, and without what would end a comment
-        return tuple(" ".join(line.replace("--", "- -").split()) for line in (*lines, *self.remarks))
+        return tuple(_of_a_comment(line) for line in (*lines, *self.remarks))
 
     def _nearest(self) -> NDArray[np.float64]:
         from armload.inertia import nearest_consistent
@@ -256,3 +256,13 @@ def counted_numbers(parameters: InertialParameters, order: str) -> list[float]:
     if parameters.phi.any():
         return numbers_of(parameters, order)
     return [0.0] * len(to_order(InertialParameters(np.eye(10)[0]), order))
+
+
+def _of_a_comment(text: str) -> str:
+    r"""A text as one line that ends no comment: XML's ends with two hyphens, Java reads \\u000a as a line's end.
+
+    >>> print(_of_a_comment("a---b\n\\u000ac"))
+    a- - -b /u000ac
+    """
+    shown = "".join(c if c.isprintable() else " " for c in text)
+    return " ".join(re.sub("-(?=-)", "- ", shown).replace("\\", "/").split())

@@ -6,6 +6,7 @@ It refers to the arm and to the trained model, has neither in it, and is refused
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -52,7 +53,7 @@ def load_state(path: str | PathLike[str], arm: Arm, method: str, engine: Identif
     """
     with _opened(path) as (text, data):
         if text["format"] != FORMAT:
-            raise IdentificationError(f"{path} belongs to another version of armload: begin anew")
+            raise IdentificationError(f"{path} belongs to another version of armload: begin without it")
         _check_origin(path, text["origin"], _origin(arm, method, engine))
         arrays = [data[f"a{k}"] for k in range(len(data.files) - 1)]
         return Unpacker(text["objects"], arrays, _known(arm, engine)).value(text["tree"])
@@ -65,7 +66,12 @@ def saved_at(path: str | PathLike[str]) -> float:
         IdentificationError: missing, damaged or foreign file.
     """
     with _opened(path) as (text, _):
-        return float(text["saved"])
+        saved = float(text["saved"])
+        if not math.isfinite(saved):
+            raise IdentificationError(
+                f"{path} says that it was saved at {saved}, expected seconds since 1970: begin without it"
+            )
+        return saved
 
 
 @contextmanager

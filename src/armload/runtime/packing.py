@@ -80,7 +80,7 @@ class Unpacker:
         """What a node stands for.
 
         Raises:
-            ValueError: an object of another package.
+            ValueError: an object of another package, or a class that is no named tuple where one stands.
         """
         if not isinstance(node, dict):
             return node
@@ -98,7 +98,7 @@ class Unpacker:
             return array[()] if scalar else array
         if what == "group" and name not in ("list", "deque"):
             items = [self.value(node) for node in held[0]]
-            return tuple(items) if name == "tuple" else _class(name)(*items)
+            return tuple(items) if name == "tuple" else _named(name, items)
         made: Any = _GROUPS[name]() if what == "group" else {} if what == "dict" else object.__new__(_class(name))
         self._made[index] = made  # what it holds may hold it
         if what == "group":
@@ -111,8 +111,17 @@ class Unpacker:
 
 
 def _class(name: str) -> type:
+    """A class of armload by its name: what a module has from elsewhere, or calls otherwise, is none of its own."""
     module, _, kind = name.rpartition(".")
-    found = getattr(importlib.import_module(module), kind) if name.startswith(_PACKAGE) else None
-    if not isinstance(found, type):
+    found = getattr(importlib.import_module(module), kind, None) if name.startswith(_PACKAGE) else None
+    if not isinstance(found, type) or found.__module__ != module:
         raise ValueError(f"it holds a {name}")
     return found
+
+
+def _named(name: str, items: list[Any]) -> tuple[Any, ...]:
+    """A named tuple, made without its constructor: another class's would do what a file says, connect or write."""
+    kind = _class(name)
+    if not issubclass(kind, tuple) or len(items) != len(getattr(kind, "_fields", ())):
+        raise ValueError(f"it holds a {name} of {len(items)}")
+    return tuple.__new__(kind, items)

@@ -11,7 +11,6 @@ import select
 import socket
 import sys
 import threading
-import time
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from urllib.parse import unquote, urlsplit
 
 from armload.errors import UsageError
 from armload.service.access import is_loopback
+from armload.service.in_time import InTime
 
 if TYPE_CHECKING:
     from armload.service.service import Service
@@ -111,7 +111,7 @@ class _Handler(BaseHTTPRequestHandler):
     def setup(self) -> None:
         super().setup()
         self.rfile.close()  # which waits so long for each byte
-        self.rfile = io.BufferedReader(_InTime(self.connection, self.patience))
+        self.rfile = io.BufferedReader(InTime(self.connection, self.patience))
 
     def parse_request(self) -> bool:
         """Read what follows the first line; from then on each line that is sent has its own time."""
@@ -209,27 +209,6 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Requests are not logged."""
-
-
-class _InTime(io.RawIOBase):
-    """What a client sends within so many seconds [s] in all: byte by byte it would hold its place for ever.
-
-    Raises:
-        TimeoutError: it takes longer.
-    """
-
-    def __init__(self, connection: socket.socket, patience: float) -> None:
-        self._connection, self._until = connection, time.monotonic() + patience
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        left = self._until - time.monotonic()
-        if left <= 0.0:
-            raise TimeoutError("the request took too long")
-        self._connection.settimeout(left)
-        return self._connection.recv_into(buffer)
 
 
 def _into(lines: queue.Queue[dict[str, Any]], name: str | None) -> Callable[[dict[str, Any]], None]:

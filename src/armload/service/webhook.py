@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
+import socket
 import threading
 import urllib.error
 import urllib.request
 from collections import deque
 from collections.abc import Mapping
-from http.client import HTTPException
+from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnection
 from typing import Any
 from urllib.parse import urlsplit
 
 from armload.errors import UsageError, one_line
 from armload.service.backoff import Backoff
+from armload.service.in_time import InTime
 from armload.service.receiver import Health, is_host, without_user
 
 _ANSWERED = 5.0  # [s] a receiver may take
@@ -34,7 +37,34 @@ class _NotFollowed(urllib.request.HTTPRedirectHandler):
         """Follow none: the answer is the status itself."""
 
 
-_OPENER = urllib.request.build_opener(_NotFollowed)
+class _Answer(HTTPResponse):
+    """An answer that has come within `_ANSWERED`, not each of its bytes."""
+
+    def __init__(self, sock: socket.socket, *arguments: Any, **named: Any) -> None:
+        super().__init__(sock, *arguments, **named)
+        self.fp.close()
+        self.fp = io.BufferedReader(InTime(sock, _ANSWERED))
+
+
+class _Connection(HTTPConnection):
+    response_class = _Answer
+
+
+class _ConnectionWithTls(HTTPSConnection):
+    response_class = _Answer
+
+
+class _InTimeHandler(urllib.request.HTTPHandler):
+    def http_open(self, request: urllib.request.Request) -> Any:
+        return self.do_open(_Connection, request)
+
+
+class _InTimeHandlerWithTls(urllib.request.HTTPSHandler):
+    def https_open(self, request: urllib.request.Request) -> Any:
+        return self.do_open(_ConnectionWithTls, request)
+
+
+_OPENER = urllib.request.build_opener(_NotFollowed, _InTimeHandler, _InTimeHandlerWithTls)
 
 
 class Webhook:

@@ -29,7 +29,7 @@ from contextlib import contextmanager
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.app.cli.outputs import check_outputs
-from armload.app.cli.printing import drop_unwritten, print_note
+from armload.app.cli.printing import drop_unwritten, on_one_line, print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import missing
 from armload.runtime.interruption import ended_by_hangup
@@ -228,4 +228,4 @@ def _fail(message: str, code: int, show_traceback: bool) -> int:
 
 
 def _show_warning(message, category, filename, lineno, file=None, line=None) -> None:  # noqa: ARG001
-    print(f"armload: warning: {' '.join(str(message).split())}", file=file or sys.stderr)
+    print(f"armload: warning: {on_one_line(str(message))}", file=file or sys.stderr)

@@ -52,7 +52,16 @@ _aside: Aside[str] | None = None  # who writes the notes, where that is not whoe
 
 def print_note(text: str) -> None:
     """One line on stderr, so that stdout holds the answer only; where it cannot be written, nothing ends for that."""
-    (_write_note if _aside is None else _aside.put)(f"armload: {' '.join(text.split())}")
+    (_write_note if _aside is None else _aside.put)(f"armload: {on_one_line(text)}")
+
+
+def on_one_line(text: str) -> str:
+    r"""A text as a terminal may show it: a name from a file that is nobody's friend must not colour, clear or forge.
+
+    >>> print(on_one_line("log \x1b[2J.csv\nis none"))
+    log \x1b[2J.csv is none
+    """
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 def _write_note(line: str) -> None:

@@ -5,6 +5,7 @@ viser keeps its state, so that a page that is opened later shows the same.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from html import escape
@@ -14,7 +15,7 @@ import numpy as np
 
 from armload.app.page.scene import HELD, REGION, TRUTH, DrawnArm
 from armload.app.page.server import PageServer, look_at_arm
-from armload.app.page.style import SHEET, TEXT
+from armload.app.page.style import SHEET, TEXT, awake
 from armload.arms import PAYLOAD_REACH, Arm
 from armload.arms.units import heading, marked
 from armload.excitation import Surroundings
@@ -79,7 +80,7 @@ class MotionPage:
     def go_on(self, seconds: float) -> None:
         """Show the motion so many seconds later, if it runs: after its end it rests, and begins again."""
         if self._runs.value:
-            self._at += SPEEDS[self._speed.value] * seconds
+            self._at += SPEEDS.get(self._speed.value, 1.0) * seconds  # a client may send any text
             if self._at > self._motion.duration + _REST:
                 self._at = 0.0
             self.show(self._at)
@@ -118,7 +119,7 @@ class MotionPage:
 
     def _build_panel(self, gui: Any) -> None:
         motion = self._motion
-        gui.add_html(SHEET)
+        gui.add_html(SHEET + awake(self._page.label))
         gui.add_html(f'<div style="{TEXT}"><b>{escape(motion.name)}</b>, {motion.duration:g} s</div>')
         self._runs = gui.add_checkbox("Run", initial_value=True)
         self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="real time")
@@ -130,7 +131,7 @@ class MotionPage:
 
         @self._time.on_update
         def _(event: Any) -> None:
-            if event.client is not None:  # else we set it ourselves
+            if event.client is not None and math.isfinite(event.target.value):  # else we set it ourselves
                 self._runs.value = False
                 self._at = float(event.target.value)
                 self.show(self._at)
@@ -144,11 +145,12 @@ class MotionPage:
             cells = "".join(f'<td style="text-align:right;padding:0 6px">{x}</td>' for x in
                             (f"{q[k]:+.3f}", f"{dq[k]:+.3f}", share))  # fmt: skip
             rows.append(
-                f'<tr data-armload="joint{k + 1}"><td>{escape(marked(name, limits.slides, k))}</td>{cells}</tr>'
+                f'<tr data-armload="joint{k + 1}"><th scope="row" style="text-align:left;font-weight:400">'
+                f"{escape(marked(name, limits.slides, k))}</th>{cells}</tr>"
             )
         where, how_fast = (heading(what, limits.slides).removeprefix(f"{what} ") for what in ("position", "velocity"))
         head = "".join(
-            f'<th style="text-align:{side};font-weight:600;padding:0 6px">{text}</th>'
+            f'<th scope="col" style="text-align:{side};font-weight:600;padding:0 6px">{text}</th>'
             for text, side in (("joint", "left"), (where, "right"), (how_fast, "right"), ("of its limit", "right"))
         )
         distances = zip(("floor", "itself", "boxes"), self._around.clearance(q[None])[0], strict=True)

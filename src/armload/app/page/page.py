@@ -17,7 +17,7 @@ from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.server import PageServer, look_at_middle, look_from
 from armload.app.page.status import Status, Watcher
-from armload.app.page.style import AWAKE, SHEET, SOFT, TEXT, heard, unheard
+from armload.app.page.style import SHEET, SOFT, TEXT, awake, heard, unheard
 from armload.arms import Arm, rated_mass
 from armload.errors import ArmloadError, ModelError
 from armload.identification import METHODS, default_for
@@ -26,6 +26,7 @@ from armload.service.session import Session
 
 _NUMBERS, _CURVES = 3, 8  # pictures from which on numbers and curves follow
 SPANS = {"last 30 s": 30.0, "last 2 min": 120.0, "last 10 min": 600.0, "last hour": 3600.0, "everything": float("inf")}
+_SPAN = SPANS["last 30 s"]  # at first
 _BALL = 0.05  # [m] radius of what a simulated arm takes up by hand
 _VIEWS = ("payload", "whole arm")
 _KEY = (
@@ -108,7 +109,8 @@ class Page:
                     session.source.name, estimate, session.lost, None if status.why is None else status.why.reason
                 )
             if curves:
-                t, rows = session.history.last(SPANS[self._span.value])
+                span = SPANS.get(self._span.value, _SPAN)  # a client may send any text, and all look at one page
+                t, rows = session.history.last(span)
                 for group, plot in zip(GROUPS, self._plots, strict=True):
                     plot.data = data_of(group, t, rows)
 
@@ -172,7 +174,7 @@ class Page:
 
     def _build_panel(self, gui: Any) -> None:
         session = self.session
-        gui.add_html(SHEET + AWAKE)
+        gui.add_html(SHEET + awake(self._page.label))
         self._headline = gui.add_html(tables.headline(None))
         self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
         self._status = gui.add_html("")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import logging
 import math
 import secrets
 import socket
@@ -34,7 +35,7 @@ class PageServer:
             on this machine. otherwise: what whoever has no viser can do instead of installing it.
 
     Attributes:
-        viser: viser's own server. url: where to find the page, with the token that lets in.
+        viser: viser's own server. label: title of the page. url: where to find the page, with the token that lets in.
 
     Raises:
         UsageError: viser is not installed, or there is no such interface.
@@ -43,6 +44,7 @@ class PageServer:
     def __init__(
         self, host: str, port: int, label: str, token: str | None = None, otherwise: str = "use --headless"
     ) -> None:
+        self.label = label
         try:
             viser: Any = importlib.import_module("viser")
         except ImportError:
@@ -53,6 +55,8 @@ class PageServer:
             socket.create_server((host, 0), family=family).close()  # viser would try one port after another, for ever
         except OSError as error:
             raise UsageError(f"no page can be served at {host!r}: {error.strerror or error}; try 127.0.0.1") from None
+        # what a stranger's request is not is told with a traceback, where a terminal shows what armload says
+        logging.getLogger("websockets").setLevel(logging.CRITICAL)
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser = viser.ViserServer("127.0.0.1", 0, label, verbose=False)
         # the page leaves this machine only if somebody forwards it

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from html import escape
+
 TEXT = "font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums;padding:2px 8px"
 SOFT = "color:var(--mantine-color-dimmed)"
 WARNING = ' style="color:var(--mantine-color-red-text)"'
 
-# viser's own grey and red have a contrast of 3.3 to white, where 4.5 is the least for text of this size (WCAG 2.2,
-# 1.4.3); these have 5 or more, on white as well as on viser's dark grey. On a phone viser makes its sheet 20em wide,
-# which cuts the table off and leaves a strip of floor beside it. On a tablet held upright it leaves 120 px of picture
-# between the two panels: there the picture is above them, as wide as the screen.
+# viser's own grey and red have a contrast of 3.3 to white, the blue of its buttons and tabs 3.6 (3.1 in the dark). 4.5
+# is the least for text of this size (WCAG 2.2, 1.4.3); these have 5 or more, on white as well as on viser's dark grey.
+# On a phone viser makes its sheet 20em wide, which cuts the table off and leaves a strip of floor beside it. On a
+# tablet held upright it leaves 120 px of picture between the two panels: there the picture is above them, as wide as
+# the screen.
 SHEET = """<style>
 :root[data-mantine-color-scheme="light"] {
   --mantine-color-dimmed: #5c6570 !important; --mantine-color-red-text: #c92a2a !important;
-  --armload-good: #237a34; --armload-wait: #b35900; }
+  --armload-good: #237a34; --armload-wait: #b35900; --armload-act: #1864ab;
+  --mantine-color-blue-filled: var(--armload-act) !important;
+  --mantine-primary-color-filled: var(--armload-act) !important; }
 :root[data-mantine-color-scheme="dark"] {
   --mantine-color-dimmed: #a3abb5 !important; --mantine-color-red-text: #ff8787 !important;
-  --armload-good: #69db7c; --armload-wait: #ffa94d; }
+  --armload-good: #69db7c; --armload-wait: #ffa94d; --armload-act: #74c0fc; }
+:root[data-mantine-color-scheme] { --mantine-color-blue-outline: var(--armload-act) !important; }
+[role="tab"] { color: var(--armload-act) !important; }
 @media (max-width: 36em) {
   .mantine-Paper-root[style*="width: 20em"],
   .mantine-Paper-root[style*="width: 20em"] .mantine-ScrollArea-content > [style*="width: 20em"] {
@@ -66,6 +73,14 @@ def unheard(beat: int) -> str:
     )
 
 
-# viser connects again only while its window has the focus, which a display on a wall never has; it asks the page, and
-# here is the only way to a page of viser's for a script
-AWAKE = '<img alt="" src="data:," style="display:none" onerror="document.hasFocus=()=>true">'
+def awake(title: str) -> str:
+    """What a page of viser's does not do by itself, and here is the only way to it for a script.
+
+    viser connects again only while its window has the focus, which a display on a wall never has; it asks the page.
+    And it calls every page "Viser": tabs of several arms, and what a screen reader says first, would be alike.
+
+    Args:
+        title: of the page; it may hold anything.
+    """
+    does = "document.hasFocus=()=>true;document.title=this.dataset.title"
+    return f'<img alt="" src="data:," style="display:none" data-title="{escape(title)}" onerror="{does}">'

@@ -153,7 +153,7 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
         return ""
     heads = [("", "left"), ("value", "right"), ("± 95 %", "right"), ("truth", "right"), ("unit", "left")]
     head = "".join(
-        f'<th style="text-align:{side};font-weight:600;padding:0 4px;width:{width}">{text}</th>'
+        f'<th scope="col" style="text-align:{side};font-weight:600;padding:0 4px;width:{width}">{text}</th>'
         for (text, side), width in zip(heads, _WIDTHS, strict=True)
         if truth is not None or text != "truth"
     )
@@ -161,14 +161,14 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
     for k, name in enumerate(NAMES):
         known, digits, half = bool(estimate.determined[k]), _DECIMALS[k], Z95 * float(estimate.std[k])
         cells = [
-            ("left", name),
             ("right", _signed(estimate.phi[k], digits)),
             ("right", f"{half:.{digits}f}" if known and np.isfinite(half) else "unknown"),
             *([] if truth is None else [("right", _signed(truth.phi[k], digits))]),
             ("left", UNITS[k]),
         ]
         row = "".join(f'<td style="text-align:{side};padding:0 4px">{text}</td>' for side, text in cells)
-        rows.append(f'<tr data-armload="phi{k}" style="{"" if known else SOFT}">{row}</tr>')
+        head_of_row = f'<th scope="row" style="text-align:left;font-weight:400;padding:0 4px">{name}</th>'
+        rows.append(f'<tr data-armload="phi{k}" style="{"" if known else SOFT}">{head_of_row}{row}</tr>')
     return (
         f'<div style="{TEXT};overflow-x:auto"><table style="width:100%;min-width:{_NARROW}px;table-layout:fixed;'
         f'border-collapse:collapse;white-space:nowrap"><tr>{head}</tr>{"".join(rows)}</table></div>'

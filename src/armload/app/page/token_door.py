@@ -86,8 +86,9 @@ class TokenDoor:
         assert task is not None
         self._tasks.add(task)
         gone = (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError)  # or it speaks no HTTP
+        ended = asyncio.CancelledError  # by `_end`; what is cancelled is logged with a traceback up to Python 3.11
         try:
-            with contextlib.suppress(*gone):
+            with contextlib.suppress(*gone, ended):
                 if len(self._tasks) <= _MOST:
                     await self._let_in(reader, writer)
         finally:
