@@ -13,13 +13,14 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from armload import identify
+from armload import arm, identify
 from armload.errors import RecordingError
 from armload.identification import check_plausible
 from armload.motion import random_motion
 from armload.payloads import test_payload as make_payload
 from armload.recording import Recording, read_long, read_recording, recording_chunks, write_recording
-from armload.simulation import World, simulate_inverse
+from armload.recording.spooled import OnDisk, spooled
+from armload.simulation import Sensors, World, simulate_inverse
 
 KINDS = ("csv", "semicolons", "parquet", "lists", "npz", "hdf5", "bag", "db3", "mcap", "unstamped")
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -122,6 +123,20 @@ def test_a_log_on_disk_is_answered_as_one_in_memory(panda, files, kind, size, mo
         assert (a.start, a.stop, a.answer.notes) == (b.start, b.stop, b.answer.notes)
         np.testing.assert_allclose(b.answer.phi, a.answer.phi, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(b.answer.phi_low, a.answer.phi_low, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+def test_a_log_on_disk_is_answered_without_having_all_of_it_in_memory(name, monkeypatch):
+    """numpy asks for the array behind an operand: whatever is done with a whole q, dq or tau reads all of it."""
+    robot = arm(name)
+    about = {"world": World.real_like(robot, 3), "sensors": Sensors.of(robot), "rate": 100.0, "seed": 1}
+    log = spooled([simulate_inverse(robot, random_motion(robot, 4, duration=10.0), make_payload(), **about)], "log")
+
+    def refused(values, dtype=None, copy=None):
+        raise AssertionError(f"all of {values.shape} were asked for, as {dtype} (copy: {copy})")
+
+    monkeypatch.setattr(OnDisk, "__array__", refused)
+    assert identify(log, robot).n_samples > 900
 
 
 @pytest.mark.parametrize("size", [33, 4096])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
-from armload.recording import Recording
+from armload.recording import Recording, blocks
 
 RECORD = "record the arm as it is, without the payload, on any motion of 20 s, and name the log with --tare"
 
@@ -178,14 +178,22 @@ def paused(recording: Recording) -> tuple[str, ...]:
 
 def rested(recording: Recording, arm: Arm) -> tuple[str, ...]:
     """That an arm stands at the end for as long as an exchange takes, where its torque does not show one."""
-    moved = np.flatnonzero(np.abs(recording.q - recording.q[-1]).max(axis=1) > MOVES)
-    rests = float(recording.t[-1] - recording.t[moved[-1] if moved.size else 0])
-    if not arm.motor_torque or not moved.size or rests < PAUSE_SAID:
+    rests = _stands_at_the_end(recording) if arm.motor_torque else 0.0
+    if rests < PAUSE_SAID:
         return ()
     return (
         f"the arm stands in the last {rests:.1f} s: what is taken up or put down there hardly shows in the motors' "
         "torque; let the arm move on after it",
     )
+
+
+def _stands_at_the_end(recording: Recording) -> float:
+    """How long [s]; 0 where the arm never moves."""
+    for rows in reversed(list(blocks(len(recording)))):
+        moved = np.flatnonzero(np.abs(recording.q[rows] - recording.q[-1]).max(axis=1) > MOVES)
+        if moved.size:
+            return float(recording.t[-1] - recording.t[rows.start + moved[-1]])
+    return 0.0
 
 
 def learned_from(session: str) -> str:

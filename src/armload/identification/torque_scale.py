@@ -32,7 +32,6 @@ both among the unknowns (`gears`). The first question is asked without them, as 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -112,9 +111,7 @@ def torque_scale(
     constants: (n,) [N·m/A] if tau is current. most: windows, spread over the log. lacks: what was taken out of tau, at
     positions (M, n), (M, n) [N·m]. gears: whether viscous friction and the rotors' inertia may be in tau, too.
     """
-    if constants is not None:
-        recording = replace(recording, tau=recording.tau * constants)
-    system = _System.of(recording, arm, most, lacks, gears)
+    system = _System.of(recording, arm, most, lacks, gears, constants)
     if system is None:
         return None
     A, b, y, inner = system.A, system.b, system.y, system.inner
@@ -178,12 +175,14 @@ class _System(NamedTuple):
         most: int = _MOST_WINDOWS,
         lacks: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         gears: bool = False,
+        constants: NDArray[np.float64] | None = None,
     ) -> _System | None:
-        """The model above of a log; None: it is too short to say anything."""
+        """The model above of a log; None: it is too short to say anything. Arguments as of `torque_scale`."""
         parts = _some(windows(recording), most)
         if len(parts.first) < 2:
             return None
         own, payload, tau, friction, moving = _averages(recording, arm, parts)
+        tau = tau if constants is None else tau * constants
         if lacks is not None:
             tau = tau + _mean(recording, parts, lacks)
         W, n = own.shape
