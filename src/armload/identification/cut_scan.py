@@ -46,8 +46,9 @@ class Unchanged:
         prior_std: NDArray[np.float64],
         scales: Scales | None,
     ) -> None:
-        self._stretches = [stretch.of_features(features) for stretch in stretches]
-        whole = RegressionData.joined(self._stretches)
+        whole = RegressionData.joined(stretches).of_features(features)
+        self._correction = whole.correction
+        self._stretches = [stretch.products_of(features) for stretch in stretches]
         problem = Problem([*known, whole], prior_std, None, SMOOTH, same=True)
         scales = problem.scales(scales)
         self._found = problem.posterior(scales)
@@ -58,9 +59,9 @@ class Unchanged:
     def at_cuts(self) -> list[Told]:
         """Λ (10, 10) and h (10,) of what is added between one stretch and the next, for each such cut."""
         U, b, out = np.zeros((10, *self._at.shape)), np.zeros((10, len(self._S))), []
-        for stretch in reversed(self._stretches[1:]):
-            U += stretch.A[:, :10].swapaxes(0, 1) / self._S[:, None]
-            b += stretch.b[:, :10].T / self._S
+        for A, Xr in reversed(self._stretches[1:]):
+            U += A[:, :10].swapaxes(0, 1) / self._S[:, None]
+            b += Xr[:, :10].T / self._S
             out.append(self._told(U, b, U[:, :, :10].sum(axis=1)))
         return out[::-1]
 
@@ -69,18 +70,18 @@ class Unchanged:
 
         height: of the ramp in each stretch.
         """
-        n, correction = len(self._S), self._stretches[0].correction
+        n, correction = len(self._S), self._correction
         joints, offsets = np.arange(n), 10 + correction.offset(np.arange(correction.size)).astype(int)
         drifts, m = 10 + joints, 10 + n
         U, b, squares = np.zeros((m, *self._at.shape)), np.zeros((m, n)), np.zeros((m, m))
-        for k, (s, stretch) in enumerate(zip(height, self._stretches, strict=True)):
-            rows = stretch.A[joints, offsets] / self._S[:, None]  # ∫ X_j dt of each joint
+        for k, (s, (A, Xr)) in enumerate(zip(height, self._stretches, strict=True)):
+            rows = A[joints, offsets] / self._S[:, None]  # ∫ X_j dt of each joint
             U[drifts, joints] += s * rows
-            b[drifts, joints] += s * stretch.b[joints, offsets] / self._S
+            b[drifts, joints] += s * Xr[joints, offsets] / self._S
             squares[drifts, drifts] += s**2 * rows[joints, offsets]
             if k >= cut:
-                U[:10] += stretch.A[:, :10].swapaxes(0, 1) / self._S[:, None]
-                b[:10] += stretch.b[:, :10].T / self._S
+                U[:10] += A[:, :10].swapaxes(0, 1) / self._S[:, None]
+                b[:10] += Xr[:, :10].T / self._S
                 squares[10:, :10] += s * rows[:, :10]
         squares[:10, :10], squares[:10, 10:] = U[:10, :, :10].sum(axis=1), squares[10:, :10].T
         return self._told(U, b, squares)

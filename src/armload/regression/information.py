@@ -144,10 +144,15 @@ class RegressionData:
         out = RegressionData(self.correction, self.gain, features, self.blocks.block, self.session)
         out.noise, out.usual = self.noise, self.usual
         rows, by = self._of(features)
-        out.A = self.A[:, rows[:, None], rows] * np.outer(by, by)
-        out.b, out.c = self.b[:, rows] * by, self.c
+        out.A, out.b = self.products_of(features)
+        out.c = self.c
         out.blocks = self.blocks.mapped(lambda sums: sums[..., np.append(rows, -1)] * np.append(by, 1.0))
         return out
+
+    def products_of(self, features: JointFeatures) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A (n, size, size) and b (n, size) with the first waves of the pose only."""
+        rows, by = self._of(features)
+        return self.A[:, rows[:, None], rows] * np.outer(by, by), self.b[:, rows] * by
 
     def _of(self, features: JointFeatures) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Which unknowns are those with fewer features, and the factors that make them so."""
