@@ -39,7 +39,9 @@ from armload.inertia import InertialParameters
 from armload.lab.episodes import Episode, draw_episodes
 from armload.posterior import learn_profile, profile_learning, profile_session, stream
 from armload.posterior.profile import Profile
+from armload.recording import GAP
 from armload.regression import FilteredRegression, JointFeatures, information
+from armload.regression.rows import Row, Rows
 from armload.simulation import Run, simulate_many
 
 MANY = 1024  # features that are reduced
@@ -77,17 +79,25 @@ class DirectedRows(FilteredRegression):
         self.features = features
         super().__init__(robot, gain, mismatch, features, *how)
 
-    def _made(self, q: NDArray, dq: NDArray, torque: NDArray, steps: NDArray, fresh: NDArray) -> tuple:
-        state, last = self._pose.copy()
-        h, X, r, weights = super()._made(q, dq, torque, steps, fresh)
+    def reset(self) -> None:
+        super().reset()
+        self._directed = np.zeros((2, self.features.pose))  # states of the lags, their last inputs
+        self._before = -np.inf  # [s] time of the last row
+
+    def rows(self, t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike) -> Rows:
+        rows = super().rows(t, q, dq, tau)
         if isinstance(self.features, Directions):
-            for k, f in enumerate(self.features.of_pose(q)):
-                x = self.gain * steps[k]
-                state, last = (np.zeros_like(f), f) if fresh[k] else (state, last)
-                state = (2.0 - x) / (2.0 + x) * state + x / (2.0 + x) * (f + last)
-                X[k, :, self._wide : self._wide + len(f)], last = state, f
-            self._pose[:] = state, last
-        return h, X, r, weights
+            of_pose = slice(self._wide, self._wide + self.features.pose)
+            for k, f in enumerate(self.features.of_pose(rows.q)):
+                step = rows.t[k] - self._before
+                state, last = self._directed if step <= GAP else (np.zeros_like(f), f)
+                x = self.gain * (step if step <= GAP else 0.0)
+                self._directed = np.array([((2.0 - x) * state + x * (f + last)) / (2.0 + x), f])
+                rows.X[k, :, of_pose], self._before = self._directed[0], rows.t[k]
+        return rows
+
+    def row(self, *sample: Any) -> Row | None:
+        raise NotImplementedError("logs only: `rows`")
 
 
 @contextmanager

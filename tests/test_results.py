@@ -771,6 +771,24 @@ def test_what_profiles_gain_and_miss_is_what_was_measured():
     ) in page
 
 
+def test_rows_of_directions_hold_lagged_directions(monkeypatch):
+    """Rows as the package makes them would hold waves instead, and a profile of directions be one of waves."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from profile_waves import DirectedRows, Directions
+
+    from armload import arm
+    from armload.motion import random_motion
+    from armload.regression import first_order_lag
+    from armload.simulation import simulate_inverse
+
+    panda = arm("panda")
+    log = simulate_inverse(panda, random_motion(panda, 1, duration=3.0), rate=100.0)
+    features = Directions.of([log], 6, 4)
+    X = DirectedRows(panda, 7.0, None, features)(log.t, log.q, log.dq, log.tau)[1]
+    expected = first_order_lag(log.t, features.of_pose(log.q), 7.0)
+    np.testing.assert_allclose(X[:, 3, 10:20], expected, rtol=1e-9, atol=1e-12)
+
+
 def test_what_stands_beside_the_survey_s_tables_is_in_them():
     page, fleet = words_of("survey"), result_of("fleet")
     sound = fleet["groups"]["sound"]
