@@ -321,6 +321,30 @@ def test_exchanged_torque_columns_of_a_real_log_are_named(wrong, name, pair):
         check_plausible(replace(log, tau=log.tau[:, order]), robot)
 
 
+@pytest.mark.parametrize("whole", [False, True])
+def test_torques_exchanged_alone_and_joints_exchanged_whole_are_told_apart(whole):
+    """Each looks like the other: to exchange what is not exchanged would spoil the positions."""
+    robot, seed = arm("gen3"), 2
+    t = np.arange(0.0, 6.0, 0.02)
+    q, dq, ddq = random_motion(robot, seed)(t)
+    tau = robot.with_payload(heavy(0.3 * robot.rated_payload, seed)).torque(q, dq, ddq)
+    order = [0, 1, 2, 3, 4, 6, 5]
+    log = Recording(t, *((q[:, order], dq[:, order]) if whole else (q, dq)), tau[:, order])
+    said = "joints 6 and 7 seem to be exchanged, in q, dq and tau" if whole else "tau6 and tau7 seem to be exchanged"
+    with pytest.raises(RecordingError, match=said):
+        check_plausible(log, robot)
+
+
+def test_a_turned_sign_that_looks_like_a_base_mounted_otherwise_is_named_beside_it():
+    robot, seed = arm("gen3"), 2
+    t = np.arange(0.0, 6.0, 0.02)
+    q, dq, ddq = random_motion(robot, seed)(t)
+    tau = robot.with_payload(heavy(0.3 * robot.rated_payload, seed)).torque(q, dq, ddq)
+    turned = np.where(np.arange(robot.n) == 1, -1.0, 1.0)
+    with pytest.raises(RecordingError, match=r"far better with gravity about .* or check the order and the signs of"):
+        check_plausible(Recording(t, turned * q, turned * dq, tau), robot)
+
+
 @pytest.mark.parametrize("name", ["panda", "ur10e"])
 @pytest.mark.parametrize("tilt", [(1.7, 0.0, -9.66), (9.81, 0.0, 0.0)])
 def test_a_base_that_leans_is_not_taken_for_exchanged_columns(sound, name, tilt):

@@ -1,7 +1,8 @@
 """Torque columns, or joints, in each other's place: found by the fit of the arm's own torque, before and after.
 
 Gravity that pulls another way than given, as on a wall, takes joints for each other, too. So no exchange is named where
-the base mounted otherwise explains the log better.
+the base mounted otherwise explains the log better. Torques that are exchanged alone look like joints that are exchanged
+whole, and the other way round: of both, what explains the log best is named.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +29,15 @@ from armload.identification.torque_scale import FEW_WINDOWS, TorqueScale, torque
 from armload.recording import Recording
 
 
+class _Exchange(NamedTuple):
+    """Two joints i and j, from 0, in each other's place, how the log fits without it, and whether q and dq are, too."""
+
+    fit: TorqueScale
+    i: int
+    j: int
+    whole: bool
+
+
 def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScale) -> None:
     """Refuse a log that is a sound one with two torque columns exchanged back, and fits far worse as it is.
 
@@ -34,22 +45,19 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
         recording, arm: the log and what it should be of. seen: how its torque fits.
 
     Raises:
-        RecordingError: so it is; the sentence names the two columns.
+        RecordingError: so it is; the sentence names the two columns, or joints where these explain the log better.
     """
     if seen.misfit < SWAPPED_MISFIT:
         return
     fits = _fits(recording, arm, _torques_exchanged)
     if not fits:
         return
-    misfit, i, j = min((fit.misfit, i, j) for fit, i, j in fits)
+    fit, i, j = min(fits, key=lambda found: found[0].misfit)
+    misfit = fit.misfit
     enough = misfit < min(SWAPPED_MISFIT, SWAPPED_SHARE * seen.misfit)
     if enough and all(b.misfit < a.misfit for a, b in _in_parts(recording, _torques_exchanged(recording, i, j), arm)):
         check_mounted_as_given(recording, arm, better_gravity(recording, arm, lambda fit: fit.misfit < misfit))
-        raise RecordingError(
-            f"{recording.source}: tau{i + 1} and tau{j + 1} seem to be exchanged (misfit {seen.misfit:.1f} times a "
-            f"sound robot's, {misfit:.1f} with these two columns the other way round): expected the torques in the "
-            f"order of {arm.name}'s joints; exchange them"
-        )
+        raise _told(recording, arm, seen, _likeliest(recording, arm) or _Exchange(fit, i, j, False))
 
 
 def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
@@ -62,26 +70,51 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
         recording, arm: the log and what it should be of.
 
     Raises:
-        RecordingError: so it is; the sentence names the two joints.
+        RecordingError: so it is; the sentence names the two joints, or columns where these explain the log better.
     """
     seen = None if recording.joint_names is not None else torque_scale(recording, arm, most=FEW_WINDOWS)
     if seen is None or seen.evidence > -JOINTS_EXCHANGED:  # no evidence is far above 0
         return
     fits = _fits(recording, arm, _joints_exchanged, partial(torque_scale, most=FEW_WINDOWS))
-    found = [(fit.evidence, i, j) for fit, i, j in fits if fit.misfit <= MODEL_MISFIT]
-    evidence, i, j = max(found, default=(-np.inf, 0, 0))
-    if evidence < seen.evidence + JOINTS_EXCHANGED:
+    found = [_Exchange(*fitted, True) for fitted in fits if fitted[0].misfit <= MODEL_MISFIT]
+    most = max(found, key=lambda exchange: exchange.fit.evidence, default=None)
+    if most is None or most.fit.evidence < seen.evidence + JOINTS_EXCHANGED:
         return
-    other = _joints_exchanged(recording, i, j)
+    other = _joints_exchanged(recording, most.i, most.j)
     if all(b.evidence > a.evidence for a, b in _in_parts(recording, other, arm)) and _with_gears_too(
         recording, other, arm
     ):
-        check_mounted_as_given(recording, arm, better_gravity(recording, arm, lambda fit: fit.evidence > evidence))
-        raise RecordingError(
-            f"{recording.source}: joints {i + 1} and {j + 1} seem to be exchanged, in q, dq and tau: expected the "
+        likeliest = _likeliest(recording, arm) or most
+        best = likeliest.fit.evidence
+        check_mounted_as_given(recording, arm, better_gravity(recording, arm, lambda fit: fit.evidence > best))
+        raise _told(recording, arm, seen, likeliest)
+
+
+def _likeliest(recording: Recording, arm: Arm) -> _Exchange | None:
+    """The exchange that explains a log best: of any two joints, or of their torques alone; None: all are surely wrong.
+
+    Of a log that names its joints, torques alone.
+    """
+    ways = ((_torques_exchanged, False), (_joints_exchanged, True))[: 1 if recording.joint_names is not None else 2]
+    few = partial(torque_scale, most=FEW_WINDOWS)
+    found = [_Exchange(*fitted, whole) for way, whole in ways for fitted in _fits(recording, arm, way, few)]
+    return max(found, key=lambda exchange: exchange.fit.evidence, default=None)
+
+
+def _told(recording: Recording, arm: Arm, seen: TorqueScale, exchange: _Exchange) -> RecordingError:
+    """That a log which fits as `seen` has two joints, or their torques, in each other's place."""
+    i, j = exchange.i + 1, exchange.j + 1
+    if exchange.whole:
+        return RecordingError(
+            f"{recording.source}: joints {i} and {j} seem to be exchanged, in q, dq and tau: expected the "
             f"order of {arm.name}'s joints ({', '.join(arm.joint_names)}); a ROS driver may give that of the alphabet; "
             "name the columns, or exchange them"
         )
+    return RecordingError(
+        f"{recording.source}: tau{i} and tau{j} seem to be exchanged (misfit {seen.misfit:.1f} times a "
+        f"sound robot's, {exchange.fit.misfit:.1f} with these two columns the other way round): expected the "
+        f"torques in the order of {arm.name}'s joints; exchange them"
+    )
 
 
 def _with_gears_too(recording: Recording, other: Recording, arm: Arm) -> bool:

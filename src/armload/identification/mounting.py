@@ -69,7 +69,7 @@ def check_mounted_as_given(recording: Recording, arm: Arm, way: NDArray[np.float
     if way is not None:
         raise RecordingError(
             f"{recording.source}: tau fits {arm.name} far better {_about(way, arm)}: expected the base mounted as "
-            "given; say how it is (--gravity), or check the order of the joints"
+            "given; say how it is (--gravity), or check the order and the signs of the joints"
         )
 
 
