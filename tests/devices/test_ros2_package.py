@@ -409,6 +409,37 @@ def test_a_message_that_a_signal_cuts_off_is_no_failure(ros, ended):
         assert ("Traceback" in node.noted()) is not ended
 
 
+_WAITED = """
+import time
+import rclpy
+from armload import arm
+from armload_ros.payload_identifier import PayloadIdentifier
+from sensor_msgs.msg import JointState
+
+rclpy.init()
+node, panda = PayloadIdentifier(), arm("panda")
+node.trigger_configure()
+node.trigger_activate()
+q = panda.limits.middle
+message = JointState(name=panda.joint_names, position=q, velocity=[0.0] * 7, effort=panda.torque(q))
+message.header.stamp.sec = 1
+for waited in (0.0, 1.5):
+    message.header.stamp.nanosec += 10_000_000
+    node._take(message, {"received_timestamp": time.time_ns() - round(waited * 1e9)})
+    print(node._stream.estimate.age, flush=True)
+"""
+
+
+@pytest.mark.full
+@pytest.mark.usefixtures("messages")
+def test_what_a_busy_lifecycle_node_says_is_as_old_as_the_message_that_waited(ros):
+    with ros("-c", _WAITED) as node:
+        node.wait(60)
+        soon, late = map(float, node.printed_lines())
+    assert 0.0 <= soon < 1.0
+    assert late == pytest.approx(1.5, abs=0.5)
+
+
 _DIAGNOSED = """
 from types import SimpleNamespace
 from armload_ros.diagnostics import status_of

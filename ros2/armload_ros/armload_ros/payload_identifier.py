@@ -167,7 +167,7 @@ class PayloadIdentifier(LifecycleNode):
 
     # ------------------------------------------------------------------ messages
 
-    def _take(self, message: JointState) -> None:
+    def _take(self, message: JointState, info: Any) -> None:  # rclpy looks at the number of arguments
         assert self._stream is not None
         try:
             sample = self._states.sample(message, self.get_clock().now().nanoseconds)
@@ -177,17 +177,21 @@ class PayloadIdentifier(LifecycleNode):
         if sample is None:
             return
         self._heard, self._trouble = time.monotonic(), ""
+        received = int(
+            info["received_timestamp"]
+        )  # by the middleware, which may not tell; then it waited behind others
+        arrived = self._heard - (max(0, time.time_ns() - received) / 1e9 if received else 0.0)
         if self._states.has_velocities:
-            self._take_sample(sample)
+            self._take_sample(sample, arrived)
             return
         if self._telling is None:
             self._telling = Steadying(len(sample.q), alone=True)
             self.get_logger().warning(velocities_of_positions("joint_states"))
-        for told, arrived in self._telling.take(sample, self._heard):
-            self._take_sample(told, arrived)
+        for told, since in self._telling.take(sample, arrived):
+            self._take_sample(told, since)
 
-    def _take_sample(self, sample: Sample, arrived: float | None = None) -> None:
-        """A sample with velocities; arrived: when it had, if it was held back since [s, monotonic]."""
+    def _take_sample(self, sample: Sample, arrived: float) -> None:
+        """A sample with velocities; arrived: when it had [s, monotonic]."""
         assert self._stream is not None
         if self._taring is not None:
             if self._taring.take(sample) >= self.parameters.value("tare_duration"):
