@@ -10,8 +10,10 @@ import pytest
 
 from armload.arms import arm
 from armload.devices import Load, SimulatedMover, StreamedMover, Supervision, Thresholds
+from armload.devices.franka.mover import FrankaMover
+from armload.devices.remote_mover import DetachedMover, RemoteMover
 from armload.devices.ur.mover import URMover
-from armload.errors import SafetyError, SinkError
+from armload.errors import SafetyError, SinkError, SourceError
 from armload.inertia import InertialParameters
 from armload.motion import Course, StraightMotion, random_motion, taie2024
 from armload.payloads import test_payload as heavy_payload
@@ -252,6 +254,30 @@ def test_a_ur_that_does_not_follow_is_stopped_and_what_may_hold_it_is_said(ur):
             break
     assert re.search(r"off the path .*see on its pendant whether it is stopped or paused, and .*slider", mover.why)
     mover.close()
+
+
+def test_a_ur_that_is_not_where_it_was_to_go_says_what_may_have_held_it(ur):
+    mover, _ = ur("")
+    with pytest.raises(SafetyError, match=r"move the arm to its start first, and .*its speed slider is at 100 %"):
+        mover.follow(motion := StraightMotion(0.018 * np.ones(6), 0.3 * np.ones(6), 2.0))
+    remote = DetachedMover.__new__(DetachedMover)  # as the process says it that has the robot
+    remote.name, remote.arm, remote.n, remote._begun, remote._ended = mover.name, mover.arm, mover.n, 0, 0
+    remote._call = lambda called: getattr(RemoteMover(mover), called)()
+    with pytest.raises(SafetyError, match=r"move the arm to its start first, and .*its speed slider is at 100 %"):
+        remote.follow(motion)
+    mover.close()
+
+
+@pytest.mark.parametrize("ended", ["readOnce", "writeOnce"])
+def test_a_franka_robot_that_stopped_by_itself_says_what_did_and_what_to_do(ended):
+    def reflex(*_):
+        raise RuntimeError("libfranka: Move command aborted:\n motion aborted by reflex")
+
+    mover = FrankaMover.__new__(FrankaMover)  # a robot and its client are not needed for this
+    mover.name, mover._control = "fr3://robot", SimpleNamespace(**{ended: reflex})
+    mover._client = SimpleNamespace(JointPositions=lambda _: SimpleNamespace())
+    with pytest.raises(SourceError, match=r"aborted by reflex; see in Desk .* acknowledge it .* cable"):
+        mover._state() if ended == "readOnce" else mover._write(np.zeros(7))
 
 
 class Obedient(StreamedMover):

@@ -128,6 +128,22 @@ def test_what_never_comes_is_an_error_and_what_lacks_once_is_missing(panda, what
     assert missing == {name: name == what for name in whole}
 
 
+@pytest.mark.parametrize("what", ["velocity", "effort"])
+def test_what_is_nan_for_every_joint_of_the_arm_is_not_measured_as_ros2_control_says_it(panda, what):
+    names, nan = [*panda.joint_names, "finger"], [np.nan] * 7 + [0.0]
+    whole = {"position": np.zeros(8), "velocity": np.zeros(8), "effort": np.ones(8)}
+    states = JointStates(panda, "/joint_states")
+    early = states.sample(joint_state(names, *[nan] * 3, SECOND), 0)  # a driver that is not ready yet
+    assert np.isnan(early[1:]).all()
+    with pytest.raises(SourceError, match=f"no {what} for its 8 joints .all are NaN.: expected one per joint"):
+        states.sample(joint_state(names, *(whole | {what: nan}).values(), 2 * SECOND), 0)
+    states = JointStates(panda, "/joint_states", needs_velocities=False)
+    if what == "velocity":
+        states.sample(joint_state(names, *(whole | {what: nan}).values(), SECOND), 0)
+        assert not states.has_velocities
+    states.sample(joint_state(names, *whole.values(), SECOND), 0)
+
+
 def test_velocities_may_lack_where_nobody_needs_them_but_not_in_part(panda):
     q, names = np.zeros(7), panda.joint_names
     states = JointStates(panda, "/joint_states", needs_velocities=False)

@@ -236,6 +236,15 @@ def test_a_known_mass_and_a_known_tool_begin_the_stream_anew(scene):
         heavy = order("set_tool", m=700.0, z=0.05, i=0.001)
         assert not heavy["set_tool"]
         assert "give kilograms" in heavy["message"]
+        for impossible, said in (
+            ({"m": -1.0, "z": 0.05, "i": 0.001}, "the tool has a mass of -1 kg"),
+            ({"m": 0.2, "z": 0.05, "i": -0.001}, "the tool cannot exist"),
+            ({"m": 0.2, "z": 50.0, "i": 0.001}, "is it in millimetres?"),
+            ({"m": 0.2, "z": 0.05, "i": 9.0}, "is it in kg·m²?"),
+        ):
+            told = order("set_tool", **impossible)
+            assert not told["set_tool"]
+            assert said in told["message"]
         told = order("set_tool", m=0.2, z=0.05, i=0.0002)
         assert told["set_tool"], told["message"]
         order.wait(lambda: last(order.said("estimate"))["estimate"]["relative_to"] == "tool")
@@ -367,6 +376,99 @@ def test_two_requests_at_once_tell_a_controller_one_load(scene):
         assert list(told.values()) == [True], told
 
 
+@pytest.mark.full
+def test_whoever_waits_for_a_measurement_hears_of_its_end_when_the_node_is_cleaned_up(scene):
+    with scene() as order:
+        assert order("leave", inertia=1e-9, timeout=60.0) == {
+            "leave": "the node is not active any more",
+            "steps": [True, True],
+        }
+
+
+_ENDING = """
+import sys
+import rclpy
+from armload_ros import payload_identifier
+
+def fail(node):
+    if sys.argv[1] == "ended":
+        rclpy.shutdown()
+    raise RuntimeError("publisher's context is invalid")
+
+rclpy.spin = fail
+payload_identifier.main()
+"""
+
+
+@pytest.mark.full
+@pytest.mark.usefixtures("messages")
+@pytest.mark.parametrize("ended", [True, False])
+def test_a_message_that_a_signal_cuts_off_is_no_failure(ros, ended):
+    with ros("-c", _ENDING, "ended" if ended else "") as node:
+        assert node.wait(60) == (0 if ended else 1)
+        assert ("Traceback" in node.noted()) is not ended
+
+
+_WAITED = """
+import time
+import rclpy
+from armload import arm
+from armload_ros.payload_identifier import PayloadIdentifier
+from sensor_msgs.msg import JointState
+
+rclpy.init()
+node, panda = PayloadIdentifier(), arm("panda")
+node.trigger_configure()
+node.trigger_activate()
+q = panda.limits.middle
+message = JointState(name=panda.joint_names, position=q, velocity=[0.0] * 7, effort=panda.torque(q))
+message.header.stamp.sec = 1
+for waited in (0.0, 1.5):
+    message.header.stamp.nanosec += 10_000_000
+    node._take(message, {"received_timestamp": time.time_ns() - round(waited * 1e9)})
+    print(node._stream.estimate.age, flush=True)
+"""
+
+
+@pytest.mark.full
+@pytest.mark.usefixtures("messages")
+def test_what_a_busy_lifecycle_node_says_is_as_old_as_the_message_that_waited(ros):
+    with ros("-c", _WAITED) as node:
+        node.wait(60)
+        soon, late = map(float, node.printed_lines())
+    assert 0.0 <= soon < 1.0
+    assert late == pytest.approx(1.5, abs=0.5)
+
+
+_DIAGNOSED = """
+from types import SimpleNamespace
+from armload_ros.diagnostics import status_of
+
+print(status_of(None, SimpleNamespace(notes=["no sample", "a hint"]), "no sample").message)
+"""
+
+
+@pytest.mark.full
+@pytest.mark.usefixtures("messages")
+def test_diagnostics_say_a_reason_once_that_is_also_a_note(ros):
+    with ros("-c", _DIAGNOSED) as diagnosed:
+        assert diagnosed.wait(60) == 0
+        assert diagnosed.printed_lines() == ["no sample; a hint"]
+
+
+@pytest.mark.full
+@pytest.mark.usefixtures("messages")
+def test_a_parameter_of_another_kind_leaves_the_lifecycle_node_unconfigured_and_it_says_which(ros, wait_until):
+    with (
+        ros(*NODE, "--ros-args", "-p", "rate:=10", "-p", "steady:=1") as node,
+        ros(PROGRAMS / "drive_lifecycle.py", "/payload_identifier", 1) as driver,
+    ):
+        wait_until(lambda: any("configure" in line for line in driver.printed_lines()), 60, driver, node)
+        assert json.loads(driver.printed_lines()[0]) == {"step": "configure", "success": False, "state": "unconfigured"}
+        assert "the parameter steady is 1: expected true or false" in node.noted()
+        assert "Traceback" not in node.noted()
+
+
 @pytest.fixture
 def package(monkeypatch):
     """Imports a module of armload_ros that needs no ROS."""
@@ -436,6 +538,39 @@ def test_the_parameters_say_what_effort_is_on_the_topic_and_in_a_tares_bag(packa
         given["tare"] = str(write_bag(tmp_path, "mcap", {"/joint_states": list(rows)}, "recorded"))
         with pytest.raises(RecordingError, match="gravity in it already"):
             asked.tare(panda)
+
+
+def test_a_ros_parameter_is_of_its_default_s_kind_whatever_number_yaml_takes_it_for(package):
+    parameters = package("parameters")
+    given = parameters.DEFAULTS | {"rate": 20, "gravity": (0, 0, -9), "mass": 1.2, "touch_links": ("hand",)}
+    read = parameters.as_declared(given)
+    assert {name: read[name] for name in ("rate", "gravity", "mass", "touch_links")} == {
+        "rate": 20.0,
+        "gravity": [0.0, 0.0, -9.0],
+        "mass": "1.2",
+        "touch_links": ["hand"],
+    }
+    assert parameters.as_declared(parameters.DEFAULTS) == parameters.DEFAULTS
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("rate", 0.0, "a number above 0"),
+        ("rate", float("nan"), "a number above 0"),
+        ("timeout", -1.0, "a number above 0"),
+        ("tare_duration", "20 s", "a number above 0"),
+        ("end_effector", -0.1, "a number of 0 or more"),
+        ("steady", 1, "true or false"),
+        ("robot", True, "text"),
+        ("gravity", [0.0, 0.0, float("inf")], "a list of numbers"),
+        ("touch_links", [1], "a list of texts"),
+    ],
+)
+def test_a_ros_parameter_that_cannot_be_is_named_before_anything_is_made(package, name, value, expected):
+    parameters = package("parameters")
+    with pytest.raises(UsageError, match=f"the parameter {name} is .*: expected {expected}"):
+        parameters.as_declared(parameters.DEFAULTS | {name: value})
 
 
 @pytest.mark.full

@@ -65,12 +65,6 @@ class Measuring:
             if not future.done():
                 future.set_result(why)
 
-    def close(self) -> None:
-        """The action is not offered any more."""
-        self.end("the node is cleaned up")
-        self._node.destroy_timer(self._timer)
-        self._server.destroy()
-
     def _asked(self, goal: Any) -> GoalResponse:
         asked = np.array([goal.mass, goal.moment, goal.inertia, goal.timeout])
         possible = self._node.active and np.isfinite(asked).all() and (asked >= 0.0).all() and asked[:3].any()

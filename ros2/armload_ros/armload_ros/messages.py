@@ -8,10 +8,12 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import InertiaStamped, TransformStamped
 from visualization_msgs.msg import Marker
 
-from armload.devices.ros2 import message_of
+from armload.devices.ros2 import message_of, parameters_of
 from armload.devices.ros2.joint_states import JointStates
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
+from armload.payloads.payload import require_consistent
+from armload.payloads.units import require_kilogram_square_metres, require_metres
 
 WATER = 1000.0  # [kg/m³] what a ball is as large as: nobody knows the payload's size
 
@@ -44,6 +46,19 @@ def payload_message(
         message.event = [Event(kind=event.kind, noticed=noticed, began=began, mass=mass)]
     message.notes = list(estimate.notes)
     return message
+
+
+def tool_of(message: InertiaStamped) -> InertialParameters:
+    """The body in a request, about the origin of the frame that it names.
+
+    Raises:
+        ArmloadError: its numbers are not finite, no body can have them, or they are in other units.
+    """
+    tool = parameters_of(message)
+    require_consistent(tool, "the tool")
+    require_metres(tool.com, "the tool")
+    require_kilogram_square_metres(tool, "the tool")
+    return tool
 
 
 def radius(mass: float) -> float:

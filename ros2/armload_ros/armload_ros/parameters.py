@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from armload import Recording, arm, read_payload, read_recording
@@ -47,8 +48,48 @@ DEFAULTS: dict[str, Any] = {
 }
 
 
+_ABOVE_ZERO = ("tare_duration", "rate", "timeout")
+
+
+def as_declared(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters as given, each of its default's kind: YAML takes 10 for an integer, and a mass of 1.2 for a number.
+
+    Raises:
+        UsageError: one is of another kind or cannot be; it says which.
+    """
+    return {name: _as_declared(name, given[name], default) for name, default in DEFAULTS.items()}
+
+
+def _as_declared(name: str, value: Any, default: Any) -> Any:
+    if isinstance(default, bool):
+        fits, expected, made = isinstance(value, bool), "true or false", bool
+    elif isinstance(default, str):  # a mass of 1.2 lacks its error, and is refused as such later
+        fits, expected, made = isinstance(value, str) or _is_number(value), "text", str
+    elif isinstance(default, float):
+        above = name in _ABOVE_ZERO
+        fits = _is_number(value) and (value > 0.0 if above else value >= 0.0)
+        expected, made = "a number above 0" if above else "a number of 0 or more", float
+    elif isinstance(default[0], float):
+        fits = _is_list(value) and all(map(_is_number, value))
+        expected, made = "a list of numbers", lambda values: [float(x) for x in values]
+    else:
+        fits = _is_list(value) and all(isinstance(x, str) for x in value)
+        expected, made = "a list of texts", list
+    if not fits:
+        raise UsageError(f"the parameter {name} is {value!r}: expected {expected}")
+    return made(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str | bytes)
+
+
 class Parameters:
-    """Reads them when asked.
+    """Makes what they name.
 
     Args:
         value: gives one by its name.

@@ -18,6 +18,7 @@ import numpy as np
 import rclpy
 from armload_msgs.srv import SetMass, SetTool
 from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
@@ -28,7 +29,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from armload.arms import Arm
-from armload.devices.ros2 import announced, parameters_of
+from armload.devices.ros2 import announced
 from armload.devices.ros2.joint_states import JointStates, velocities_of_positions
 from armload.errors import ArmloadError
 from armload.identification import check_usable, plausible_known, plausible_tool
@@ -40,9 +41,9 @@ from armload.service.tare import Tare
 from .applying import Applying, applying_of
 from .diagnostics import status_of, values_of
 from .measuring import Measuring
-from .messages import payload_message
+from .messages import payload_message, tool_of
 from .outputs import Outputs
-from .parameters import DEFAULTS, Parameters
+from .parameters import DEFAULTS, Parameters, as_declared
 from .stream import Stream
 from .taring import Taring
 
@@ -55,15 +56,15 @@ class PayloadIdentifier(LifecycleNode):
 
     def __init__(self, **how: Any) -> None:
         super().__init__("payload_identifier", **how)
-        for name, value in DEFAULTS.items():
-            self.declare_parameter(name, value)
-        self.parameters = Parameters(lambda name: self.get_parameter(name).value)
+        for name, value in DEFAULTS.items():  # of any type, so that a wrong one is a sentence of configure
+            self.declare_parameter(name, value, ParameterDescriptor(dynamic_typing=True))
+        self.parameters = Parameters(DEFAULTS.__getitem__)
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs on while simulated time stands
         self.beside = ReentrantCallbackGroup()  # of what waits for the rest of the node
         self._stream: Stream | None = None
         self._telling: Steadying | None = None  # velocities, where the joint states have none
         self._applying: Applying | None = None
-        self._measuring: Measuring | None = None
+        self._measuring = Measuring(self)  # for good: whoever waits for a goal hears how it ended, also after cleanup
         self._outputs: Outputs | None = None
         self._offered: list[Any] = []
         self._subscription: Any = None
@@ -94,7 +95,6 @@ class PayloadIdentifier(LifecycleNode):
             self.create_service(SetMass, "~/set_mass", self._set_mass),
             self.create_service(Trigger, "~/apply", self._apply, callback_group=self.beside),
         ]
-        self._measuring = Measuring(self)
         self._each_second = self.create_timer(1.0, self._diagnose, clock=self.steady)
         return _DONE
 
@@ -113,14 +113,12 @@ class PayloadIdentifier(LifecycleNode):
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:  # noqa: ARG002
         """Forget everything."""
         self._silent()
-        if self._measuring is not None:
-            self._measuring.close()
-            self.destroy_timer(self._each_second)
         if self._outputs is not None:
+            self.destroy_timer(self._each_second)
             self._outputs.close()
         for service in self._offered:
             self.destroy_service(service)
-        self._outputs, self._offered, self._measuring = None, [], None
+        self._outputs, self._offered = None, []
         self._forget()
         return _DONE
 
@@ -133,8 +131,7 @@ class PayloadIdentifier(LifecycleNode):
             self.destroy_subscription(self._subscription)
         self._subscription, self._taring = None, None
         self._drop_held_back()
-        if self._measuring is not None:
-            self._measuring.end("the node is not active any more")
+        self._measuring.end("the node is not active any more")
 
     def _forget(self) -> None:
         for one in (self._applying, self._stream):
@@ -144,7 +141,9 @@ class PayloadIdentifier(LifecycleNode):
 
     def _begin(self) -> None:
         """The arm and the identifier that the parameters ask for, and who is told."""
-        given, bare = self.parameters, self.parameters.bare_arm()
+        read = as_declared({name: self.get_parameter(name).value for name in DEFAULTS})
+        self.parameters = given = Parameters(read.__getitem__)  # what is set later counts from the next configure on
+        bare = given.bare_arm()
         self._bare, tool = bare, given.tool(bare)
         robot = bare if tool is None else bare.with_payload(tool)
         self._states = JointStates(robot, "joint_states", given.effort(robot), needs_velocities=False)
@@ -168,7 +167,7 @@ class PayloadIdentifier(LifecycleNode):
 
     # ------------------------------------------------------------------ messages
 
-    def _take(self, message: JointState) -> None:
+    def _take(self, message: JointState, info: Any) -> None:  # rclpy looks at the number of arguments
         assert self._stream is not None
         try:
             sample = self._states.sample(message, self.get_clock().now().nanoseconds)
@@ -178,17 +177,21 @@ class PayloadIdentifier(LifecycleNode):
         if sample is None:
             return
         self._heard, self._trouble = time.monotonic(), ""
+        received = int(
+            info["received_timestamp"]
+        )  # by the middleware, which may not tell; then it waited behind others
+        arrived = self._heard - (max(0, time.time_ns() - received) / 1e9 if received else 0.0)
         if self._states.has_velocities:
-            self._take_sample(sample)
+            self._take_sample(sample, arrived)
             return
         if self._telling is None:
             self._telling = Steadying(len(sample.q), alone=True)
             self.get_logger().warning(velocities_of_positions("joint_states"))
-        for told, arrived in self._telling.take(sample, self._heard):
-            self._take_sample(told, arrived)
+        for told, since in self._telling.take(sample, arrived):
+            self._take_sample(told, since)
 
-    def _take_sample(self, sample: Sample, arrived: float | None = None) -> None:
-        """A sample with velocities; arrived: when it had, if it was held back since [s, monotonic]."""
+    def _take_sample(self, sample: Sample, arrived: float) -> None:
+        """A sample with velocities; arrived: when it had [s, monotonic]."""
         assert self._stream is not None
         if self._taring is not None:
             if self._taring.take(sample) >= self.parameters.value("tare_duration"):
@@ -207,8 +210,7 @@ class PayloadIdentifier(LifecycleNode):
         known = stream.why_unknown() is None
         body = announced(estimate) if known else None
         said = payload_message(estimate, stream.arm.name, self._states, body)
-        if self._measuring is not None:
-            self._measuring.take(said)
+        self._measuring.take(said)
         if self._applying is not None and stream.sample is not None:
             self._applying.offer(estimate, stream.sample, known, stream.doubts)
         if self._outputs is not None:
@@ -248,8 +250,7 @@ class PayloadIdentifier(LifecycleNode):
         self._stream.reset()
         self._last, self._taring = -np.inf, None
         self._drop_held_back()
-        if self._measuring is not None:
-            self._measuring.forget()
+        self._measuring.forget()
 
     def _drop_held_back(self) -> None:
         """Forget the samples whose velocities are not told yet: what comes next is of another time."""
@@ -257,8 +258,9 @@ class PayloadIdentifier(LifecycleNode):
             self._telling = Steadying(self._bare.n, alone=True)
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:  # noqa: ARG002
+        given_up = "" if self._taring is None else ", and the one that was being taken is given up"
         self.reset_stream()
-        return self._told(response, True, "the stream is forgotten; the tare, if there is one, is not")
+        return self._told(response, True, f"the stream is forgotten; the tare, if there is one, is not{given_up}")
 
     def _tare(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:  # noqa: ARG002
         if not self.active:
@@ -285,7 +287,7 @@ class PayloadIdentifier(LifecycleNode):
         try:
             robot, text = self._bare, "no tool"
             if request.tool.inertia.m != 0.0:
-                tool = plausible_tool(self._bare.in_frame(parameters_of(request.tool)), self._bare)
+                tool = plausible_tool(self._bare.in_frame(tool_of(request.tool)), self._bare)
                 robot, text = self._bare.with_payload(tool), f"a tool of {tool.mass:.3f} kg"
             self._identify(robot, None, None if self._stream is None else self._stream.known)
         except ArmloadError as error:
@@ -335,6 +337,9 @@ def main(args: list[str] | None = None) -> None:
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except RuntimeError:  # of rclpy: a message was on its way out as the signal came
+        if rclpy.ok():
+            raise
     finally:
         node.destroy_node()
         rclpy.try_shutdown()

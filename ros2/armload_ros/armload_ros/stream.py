@@ -60,17 +60,18 @@ class Stream:
     def update(self, sample: Sample, arrived: float | None = None) -> OnlineEstimate | None:
         """The answer after one more sample; None where the first ones are held back.
 
-        arrived: when it had come, if it was held back since [s, monotonic].
+        arrived: when it had come, if it waited since [s, monotonic].
         """
         now, link = time.monotonic(), self._link
+        arrived = now if arrived is None else arrived
         if link.heard is not None and now - link.heard > STALLED:  # since then the payload may have been exchanged
             link = link._replace(connections=link.connections + 1, resumed=now)
         self._link = link._replace(heard=now)
         if self._steady:
-            self._take_late(self._steadying.take(sample, (sample, time.monotonic())))
+            self._take_late(self._steadying.take(sample, (sample, arrived)))
         else:
             self._take(sample, sample)
-        if arrived is not None and self.estimate is not None:
+            assert self.estimate is not None
             self.estimate = self.estimate.behind(now - arrived)
         return self.estimate
 

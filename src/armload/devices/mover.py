@@ -46,11 +46,13 @@ class Mover(Source):
         arm: which it is.
         why: why the last movement was stopped before its end; None: it was not.
         writes: whether its controller takes a payload (`write`).
+        see: what to look at where the arm does not follow; "": nothing in particular.
     """
 
     arm: Arm
     why: str | None = None
     writes: bool = False
+    see: str = ""
 
     @property
     @abstractmethod
@@ -115,6 +117,7 @@ class StreamedMover(Mover):
         away = check_start(self, motion)
         self.why = self._stop_for = None
         self._movement = Movement(self.arm, motion, thresholds or Thresholds(), away)
+        self._movement.supervision.off = self.see
 
     def stop(self, why: str) -> None:
         """Brake with the next command."""
@@ -214,7 +217,7 @@ def check_start(mover: Mover, motion: Motion) -> NDArray[np.float64]:
     if not abs(away[j]) <= AT_START:
         raise SafetyError(
             f"{mover.arm.joint_names[j]} is {abs(away[j]):.3f} rad from where the motion {motion.name!r} begins: move "
-            "the arm to its start first"
+            "the arm to its start first" + (f", and where it does not get there, {mover.see}" if mover.see else "")
         )
     return away
 

@@ -65,9 +65,9 @@ class RemoteMover(Source):
         self.mover.stop(why)
 
     def whereabouts(self) -> dict[str, Any]:
-        """Where the arm is commanded to be, why it stopped last, and whether its controller takes a payload."""
+        """Where the arm is commanded to be, why it stopped, what to look at, whether its controller takes payloads."""
         mover = self.mover
-        return {"commanded": mover.commanded().tolist(), "why": mover.why, "writes": mover.writes}
+        return {"commanded": mover.commanded().tolist(), "why": mover.why, "see": mover.see, "writes": mover.writes}
 
     def put(self, load: dict[str, Any], allow_undetermined_inertia: bool) -> Any:
         """`Mover.write`."""
@@ -120,6 +120,11 @@ class DetachedMover(Detached, Mover):
     def why(self) -> str | None:  # type: ignore[override]
         """Why the last movement was stopped before its end."""
         return self._call("whereabouts")["why"]
+
+    @property
+    def see(self) -> str:  # type: ignore[override]
+        """What to look at where the arm does not follow."""
+        return self._call("whereabouts")["see"]
 
     def commanded(self) -> NDArray[np.float64]:
         """Where the controller holds the arm, q (n,) [rad]."""

@@ -33,6 +33,7 @@ from armload.inertia import NAMES, InertialParameters
 from armload.payloads.mesh import from_mesh, require_no_drawing
 from armload.payloads.payload import Box, Payload, require_consistent
 from armload.payloads.uncertainty import Measured, Uncertainty
+from armload.payloads.units import require_kilogram_square_metres, require_metres
 from armload.runtime.atomic import replacing
 
 FORMAT = "armload-payload/1"
@@ -41,8 +42,6 @@ _TRIPLE = ("mass", "com", "inertia_com")
 _OF_MESH = ("mesh", "scale", "density", "translation", "rotation")
 _KEYS = ("format", "name", "frame", "phi", *_TRIPLE, "boxes", "std", *_OF_MESH)
 _ALIKE = 0.7  # of two words (difflib): "inertia" is meant as "inertia_com", a comment is not
-_FARTHEST = 5.0  # [m] a centre of mass farther from the flange than this is in other units
-_WIDEST, _LIGHT = 1.0, 0.01  # [m] radius of gyration; [kg] below which inertia is what was known beforehand
 # Where a file gives phi and (mass, com, inertia_com) they may differ by printed digits, not by an edit.
 _AGREE = {"mass": 1e-3, "com": 1e-3, "inertia_com": 1e-4}  # [kg, m, kg·m²]
 
@@ -70,12 +69,7 @@ def payload_from(content: dict[str, Any], path: str | Path) -> Payload:
             return _without_inertia(content, path)
         parameters = _parameters(content, path)
         require_consistent(parameters, f"the payload in {path}")
-        reach = _gyration(parameters) if parameters.mass > _LIGHT else 0.0
-        if reach > _WIDEST:
-            raise PayloadError(
-                f"payload file {path} has the inertia of a body {reach:.3g} m wide about its centre of mass (radius of "
-                f"gyration): expected at most {_WIDEST:g} m; is it in kg·m²?"
-            )
+        require_kilogram_square_metres(parameters, f"payload file {path}")
         name, std = _text(content, "name", path) or path.stem, _uncertainty(content, path)
         return Payload(name, parameters, _boxes(content, path), uncertainty=std, measured=_measured(content, path))
     except PayloadError:
@@ -116,7 +110,7 @@ def _of_mesh(content: dict[str, Any], path: Path) -> Payload:
         rotation=numbers("rotation", 3, 3),
         translation=numbers("translation", 3),
     )
-    _require_metres(drawn.parameters.com, path)
+    require_metres(drawn.parameters.com, f"payload file {path}")
     placed = InertialParameters(drawn.parameters.phi, _text(content, "frame", path))
     name = _text(content, "name", path) or path.stem
     return replace(drawn, name=name, parameters=placed, uncertainty=_uncertainty(content, path))
@@ -124,7 +118,7 @@ def _of_mesh(content: dict[str, Any], path: Path) -> Payload:
 
 def _without_inertia(content: dict[str, Any], path: Path) -> Payload:
     mass, com = _numbers(content["mass"], (), "mass", path), _numbers(content["com"], (3,), "com", path)
-    _require_metres(com, path)
+    require_metres(com, f"payload file {path}")
     if not mass > 0:
         raise PayloadError(f"the payload in {path} has a mass of {float(mass):g} kg: expected a mass above 0")
     made = Payload.without_inertia(
@@ -223,21 +217,8 @@ def _parameters(content: dict[str, Any], path: Path) -> InertialParameters:
         if from_triple is not None and parameters.mass > 0:
             _require_agreement(parameters, from_triple, path)
     if parameters.mass > 0:
-        _require_metres(parameters.com, path)
+        require_metres(parameters.com, f"payload file {path}")
     return parameters
-
-
-def _require_metres(com: NDArray[np.float64], path: Path) -> None:
-    if np.linalg.norm(com) > _FARTHEST:
-        raise PayloadError(
-            f"payload file {path} puts the centre of mass {np.linalg.norm(com):.3g} m from the frame: "
-            "expected metres; is it in millimetres?"
-        )
-
-
-def _gyration(parameters: InertialParameters) -> float:
-    """The largest radius of gyration about the centre of mass [m]."""
-    return float(np.sqrt(np.abs(np.linalg.eigvalsh(parameters.inertia_com)).max() / parameters.mass))
 
 
 def _require_agreement(phi: InertialParameters, triple: InertialParameters, path: Path) -> None:

@@ -4,7 +4,8 @@
 
 {"apply": {}}, {"apply_twice": {}} at once, {"set_mass": {"mass": …, "std": …}}, {"set_tool": {"m": …, "z": …, "i": …}},
 {"measure": {"mass": …}}, {"cancel": {…}}: a measurement that is cancelled after its first feedback,
-{"step": {"transition": …}}. Every answer and frame is printed, too.
+{"step": {"transition": …}}, {"leave": {"mass": …}}: a measurement whose
+node is deactivated and cleaned up at once. Every answer and frame is printed, too.
 """
 
 import json
@@ -92,6 +93,18 @@ def measure(goal, cancel):
     say(measure=said.message, success=said.success, status=result.status, left=seen, payload=numbers(said.payload))
 
 
+def leave(goal):
+    client = ActionClient(node, Measure, f"{name}/measure")
+    client.wait_for_server(60.0)
+    result = wait(client.send_goal_async(Measure.Goal(**goal))).get_result_async()
+    change = node.create_client(ChangeState, f"{name}/change_state")
+    requests = [ChangeState.Request() for _ in range(2)]
+    requests[0].transition.id, requests[1].transition.id = 4, 2
+    both = [change.call_async(request) for request in requests]
+    steps, ended = [wait(each).success for each in both], wait(result, 10.0)
+    say(leave=None if ended is None else ended.result.message, steps=steps)
+
+
 def tool(given):
     request = SetTool.Request()
     request.tool.inertia.m = given["m"]
@@ -109,6 +122,9 @@ for line in sys.stdin:
     ((what, given),) = json.loads(line).items()
     if what in ("measure", "cancel"):
         measure(given, what == "cancel")
+        continue
+    if what == "leave":
+        leave(given)
         continue
     if what == "step":
         step(given["transition"])

@@ -131,7 +131,14 @@ class FrankaMover(StreamedMover):
         try:
             return self._control.readOnce()[0]
         except Exception as error:
-            raise SourceError(f"{self.name} stopped by itself: {one_line(error)}") from None
+            raise self._ended(error) from None
+
+    def _ended(self, error: Exception) -> SourceError:
+        """What to say where the client reports that the robot moves no more: a reflex, a button, a lost connection."""
+        return SourceError(
+            f"{self.name} stopped by itself: {one_line(error)}; see in Desk what stopped it and acknowledge it "
+            "there, or see to its cable where it is not heard any more"
+        )
 
     def _write(self, q: NDArray[np.float64], finished: bool = False) -> None:
         self._goal = q
@@ -140,7 +147,7 @@ class FrankaMover(StreamedMover):
         try:
             self._control.writeOnce(target)
         except Exception as error:
-            raise SourceError(f"{self.name} stopped by itself: {one_line(error)}") from None
+            raise self._ended(error) from None
         if finished:
             self._control = None
 

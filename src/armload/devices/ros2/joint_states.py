@@ -3,6 +3,7 @@
 Joints are known by **name**, that of the description or another on the arm's sheet: a message may list them in any
 order and others beside them (gripper fingers). Time is the header's stamp, counted from the first; where messages are
 not stamped (all zero) it is the time of receipt. `effort` is the joint torque, or what `Effort` makes of it.
+What a robot does not measure may be missing, or NaN for every joint, as ros2_control publishes it.
 `armload.recording.ros_bag` does the same for whole logs, and refuses what is only suspicious here.
 """
 
@@ -71,11 +72,11 @@ class JointStates:
         order = self._layouts[names]
         if order is None:
             return None
-        if not self._begun:
-            self._check(message, len(names))
-            self._begun = True
         rows = (message.position, message.velocity, message.effort)
         q, dq, tau = (_in_order(values, len(names), order) for values in rows)
+        if not self._begun and not (len(message.position) == len(names) and np.isnan(q).any()):  # else not ready yet
+            self._check(message, (q, dq, tau))
+            self._begun = True
         if self._effort is not None:
             tau = self._effort.torque(q, tau)
         return Sample(self._time(message.header.stamp, received), q, dq, tau)
@@ -97,17 +98,17 @@ class JointStates:
             self._zero = nanoseconds - since  # a clock that starts late, as simulated time does, goes on from here
         return (nanoseconds - self._zero) / 1e9 if nanoseconds else float("nan")
 
-    def _check(self, message: Any, n: int) -> None:
-        self.has_velocities = self._needs_velocities or len(message.velocity) > 0
-        for what, values in (
-            ("position", message.position),
-            ("velocity", message.velocity),
-            ("effort", message.effort),
-        ):
-            if len(values) != n and (what != "velocity" or self.has_velocities):
-                found = f"no {what}" if len(values) == 0 else f"{len(values)} values of {what}"
+    def _check(self, message: Any, values: Sequence[NDArray[np.float64]]) -> None:
+        """Whether the message has what is needed; values: q, dq and tau of the arm's joints, NaN where it has none."""
+        n, sent = len(message.name), (message.position, message.velocity, message.effort)
+        nothing = [len(rows) in (0, n) and bool(np.isnan(x).all()) for rows, x in zip(sent, values, strict=True)]
+        self.has_velocities = self._needs_velocities or not nothing[1]
+        for what, rows, none in zip(("position", "velocity", "effort"), sent, nothing, strict=True):
+            if (none or len(rows) != n) and (what != "velocity" or self.has_velocities):
+                found = f"no {what}" if none else f"{len(rows)} values of {what}"
+                which = " (all are NaN)" if none and len(rows) else ""
                 also = " (joint torque); name a topic that carries the torque" if what == "effort" else ""
-                raise SourceError(f"{self._topic} has {found} for its {n} joints: expected one per joint{also}")
+                raise SourceError(f"{self._topic} has {found} for its {n} joints{which}: expected one per joint{also}")
 
 
 def velocities_of_positions(topic: str) -> str:

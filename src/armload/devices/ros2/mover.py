@@ -60,6 +60,10 @@ class Ros2Mover(StreamedMover):
         except BaseException:
             self._source.close()
             raise
+        self.see = (  # a topic brings no refusal
+            f"see that the controller of {self._commands} is active, and whether it refuses what it is sent, or is "
+            "slowed down (a speed slider below 100 %)"
+        )
         self._start, self._sent = 0, -np.inf  # of the movement [ns since 1970], and the last message, on its clock [s]
         self._seen: NDArray[np.float64] | None = None
         self._goal: NDArray[np.float64] | None = None
@@ -96,15 +100,7 @@ class Ros2Mover(StreamedMover):
             return None
         away = np.abs(self._goal - self._seen)
         j = int(np.argmax(away))
-        return None if away[j] < _SAME else f"{self.arm.joint_names[j]} is {away[j]:.3f} rad from its end ({self._see})"
-
-    @property
-    def _see(self) -> str:
-        """What to look at where the arm does not follow: a topic brings no refusal."""
-        return (
-            f"see that the controller of {self._commands} is active, and whether it refuses what it is sent, or is "
-            "slowed down (a speed slider below 100 %)"
-        )
+        return None if away[j] < _SAME else f"{self.arm.joint_names[j]} is {away[j]:.3f} rad from its end ({self.see})"
 
     def silence(self, seconds: float) -> str:
         """What to say where no sample came for so many seconds while the arm was on its way."""
@@ -145,8 +141,6 @@ class Ros2Mover(StreamedMover):
                 )
             self._connection.spin(_LEAD)
         super().follow(motion, thresholds)
-        assert self._movement is not None
-        self._movement.supervision.off = self._see
         self._goal = motion.position([motion.duration])[0]
 
     def arrived(self) -> float | None:

@@ -31,8 +31,6 @@ _CYCLE = 2e-3  # [s] of an e-series controller
 _LOOKAHEAD, _GAIN = 0.1, 300.0  # [s, 1] of servoj: UR's defaults, as in the exported programs
 _WATCHDOG = 2.0  # [Hz] least frequency of targets: servoj stands at the last one, 0.5 s later its script ends
 _STOPJ = 4.0  # [rad/s²] deceleration of an arm that is at rest already
-# what to look at where the arm does not follow: states and targets go on in a protective stop and behind the slider
-_SEE = "see on its pendant whether it is stopped or paused, and that its speed slider is at 100 %"
 
 
 class URMover(StreamedMover):
@@ -46,6 +44,8 @@ class URMover(StreamedMover):
     """
 
     writes = True
+    # states and targets go on in a protective stop and behind the slider
+    see = "see on its pendant whether it is stopped or paused, and that its speed slider is at 100 %"
 
     def __init__(self, address: str, arm: Arm, torque_constants: Sequence[float] | None = None) -> None:
         super().__init__(arm)
@@ -73,8 +73,6 @@ class URMover(StreamedMover):
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement with the next state."""
         super().follow(motion, thresholds)
-        assert self._movement is not None
-        self._movement.supervision.off = _SEE
         try:
             self._control = load_control()(self._address, 1.0 / _CYCLE)
             self._control.setWatchdog(_WATCHDOG)
