@@ -155,6 +155,20 @@ def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, p
     assert last["mass"] == pytest.approx(body.parameters.mass, abs=0.1)
 
 
+@pytest.mark.full  # some seconds
+def test_a_wheel_without_extras_learns_a_profile_shows_it_and_says_what_to_record_next(
+    light, panda, analytic_log, tmp_path
+):
+    empty, profile = tmp_path / "empty.csv", tmp_path / "arm.profile"
+    write_recording(empty, analytic_log(panda, duration=2.0))
+    done = light("-m", "armload", "profile", empty, "--robot", "panda", "--out", profile)
+    assert done.returncode == 0, done.stderr
+    assert "one session does not tell how the arm drifts" in done.stderr
+    done = light("-m", "armload", "profile", "show", profile, "--json")
+    assert done.returncode == 0, done.stderr
+    assert "one session" in json.loads(done.stdout)["next"][0]
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("light", ["wheel"], indirect=True)
 def test_each_library_of_a_wheel_says_what_numba_says(light, panda, analytic_log, tmp_path):
