@@ -24,6 +24,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+if sys.version_info < (3, 11):  # noqa: UP036  pip builds a clone's wheel before it asks what Python the wheel is for
+    sys.exit(f"armload needs Python 3.11 or newer, and this is Python {platform.python_version()}")
+
 ROOT = Path(__file__).resolve().parent
 PURE = "ARMLOAD_PURE_WHEEL"
 

@@ -252,6 +252,15 @@ def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():
     assert all(package in of[extra] for package, extra in stated)
 
 
+def test_a_python_that_is_too_old_is_named_by_the_build_and_not_its_compiler():
+    """pip builds a clone's wheel before it asks what Python the wheel is for; this one says it is older."""
+    code = "import runpy, sys; sys.version_info = (3, 10, 13); runpy.run_path('hatch_build.py')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert PROJECT["requires-python"] == ">=3.11"
+    assert re.fullmatch(r"armload needs Python 3\.11 or newer, and this is Python [\d.]+\n", done.stderr)
+
+
 def test_the_wheel_holds_the_files_of_the_package_and_nothing_else(wheel):
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     package = ROOT / "src" / "armload"
