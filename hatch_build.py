@@ -24,6 +24,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+if sys.version_info < (3, 11):  # noqa: UP036  pip builds a clone's wheel before it asks what Python the wheel is for
+    sys.exit(f"armload needs Python 3.11 or newer, and this is Python {platform.python_version()}")
+
 ROOT = Path(__file__).resolve().parent
 PURE = "ARMLOAD_PURE_WHEEL"
 
@@ -82,7 +85,8 @@ def compile_all(folder: Path, names: list[str] | None = None) -> list[Path]:
         command = [sys.executable, str(Path(__file__).resolve()), "--one", name, str(folder)]
         running.append(subprocess.Popen(command, env=os.environ | settings | {"PYTHONPATH": path, FOLDER: ""}))
     if any(process.wait() for process in running):
-        raise RuntimeError(f"the kernels could not be compiled (is there a C++ compiler?); {PURE}=1 does without them")
+        without = f"{PURE}=1 pip install '.[jit]' does without them"
+        raise RuntimeError(f"the kernels could not be compiled (is there a C++ compiler?); {without}")
     return sorted(folder.glob("_kernels_*.so"))
 
 

@@ -75,11 +75,12 @@ def _let_numba_keep_what_it_compiles() -> None:
 
     The folder must be the user's own: what numba reads from it, it executes.
     """
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
-    if "NUMBA_CACHE_DIR" in os.environ or any(_writable(place) for place in (Path(__file__).parent, home)):
+    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))  # relative where no home is known
+    places = [Path(__file__).parent, *([home] if home.is_absolute() else [])]
+    if "NUMBA_CACHE_DIR" in os.environ or any(_writable(place) for place in places):
         return
-    folder = Path(tempfile.gettempdir()) / f"armload-{os.getuid()}"
     try:
+        folder = Path(tempfile.gettempdir()) / f"armload-{os.getuid()}"
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
         own = folder.is_dir() and not folder.is_symlink() and found.st_uid == os.getuid() and not found.st_mode & 0o077
@@ -90,7 +91,7 @@ def _let_numba_keep_what_it_compiles() -> None:
 
 def _writable(folder: Path) -> bool:
     """Whether something can be written there, the folder made first if need be."""
-    there = next(place for place in (folder, *folder.parents) if place.exists())
+    there = next(place for place in (folder, *folder.parents) if os.path.exists(place))  # no, where it may not be asked
     return os.access(there, os.W_OK)
 
 

@@ -275,6 +275,43 @@ def test_numba_keeps_what_it_compiles_in_a_folder_of_the_user_s_own_where_nothin
     assert other.stat().st_mode & 0o777 == 0o700
 
 
+HOMES = {
+    "a home that is unknown": "os.path.expanduser = lambda path: path; Path.expanduser = refuse(RuntimeError)",
+    "a home that may not be looked into": "stat = os.stat\n"
+    "os.stat = lambda path, **o: refuse(PermissionError)() if '/other/home' in str(path) else stat(path, **o)",
+    "no folder for temporary files": "tempfile.gettempdir = refuse(FileNotFoundError)",
+}
+
+
+@pytest.mark.parametrize("case", HOMES)
+def test_a_user_without_a_home_or_a_place_for_files_can_import_it(case, tmp_path):
+    """As a container's user has none; the system's own answers are played, since the tests may run as root."""
+    code = f"""
+import os, tempfile
+from pathlib import Path
+def refuse(error):
+    def ask(*_, **__):
+        raise error
+    return ask
+os.access = lambda *_: False
+{HOMES[case]}
+import armload
+print(os.environ.get("NUMBA_CACHE_DIR"))
+"""
+    env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")} | {
+        "HOME": "/other/home"
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=env | {"TMPDIR": str(tmp_path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"{None if 'temporary' in case else tmp_path / f'armload-{os.getuid()}'}\n"
+
+
 @pytest.mark.full  # some seconds
 def test_who_waits_for_the_compiler_is_told_once_and_not_when_all_is_on_disk(tmp_path):
     code = (

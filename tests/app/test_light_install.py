@@ -155,6 +155,20 @@ def test_a_wheel_without_extras_identifies_exports_and_follows_a_replay(light, p
     assert last["mass"] == pytest.approx(body.parameters.mass, abs=0.1)
 
 
+@pytest.mark.full  # some seconds
+def test_a_wheel_without_extras_learns_a_profile_shows_it_and_says_what_to_record_next(
+    light, panda, analytic_log, tmp_path
+):
+    empty, profile = tmp_path / "empty.csv", tmp_path / "arm.profile"
+    write_recording(empty, analytic_log(panda, duration=2.0))
+    done = light("-m", "armload", "profile", empty, "--robot", "panda", "--out", profile)
+    assert done.returncode == 0, done.stderr
+    assert "one session does not tell how the arm drifts" in done.stderr
+    done = light("-m", "armload", "profile", "show", profile, "--json")
+    assert done.returncode == 0, done.stderr
+    assert "one session" in json.loads(done.stdout)["next"][0]
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("light", ["wheel"], indirect=True)
 def test_each_library_of_a_wheel_says_what_numba_says(light, panda, analytic_log, tmp_path):
@@ -236,6 +250,15 @@ def test_each_extra_and_each_package_of_it_is_known_and_named_as_in_pyproject():
         ("h5py", "matlab"),
     }
     assert all(package in of[extra] for package, extra in stated)
+
+
+def test_a_python_that_is_too_old_is_named_by_the_build_and_not_its_compiler():
+    """pip builds a clone's wheel before it asks what Python the wheel is for; this one says it is older."""
+    code = "import runpy, sys; sys.version_info = (3, 10, 13); runpy.run_path('hatch_build.py')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert PROJECT["requires-python"] == ">=3.11"
+    assert re.fullmatch(r"armload needs Python 3\.11 or newer, and this is Python [\d.]+\n", done.stderr)
 
 
 def test_the_wheel_holds_the_files_of_the_package_and_nothing_else(wheel):

@@ -245,3 +245,14 @@ def test_each_episode_of_a_file_is_answered_and_a_bad_one_is_a_row(panda, tmp_pa
 def test_numbers_that_are_not_finite_never_reach_a_row(surveyed):
     for row in read_rows(surveyed)[0]:
         assert all(np.isfinite(value) for value in row.values() if isinstance(value, float))
+
+
+def test_a_table_that_cannot_be_written_for_want_of_a_package_is_refused_before_a_log_is_read(
+    fleet, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)  # as if it were not installed
+    said = []
+    with pytest.raises(ModuleNotFoundError, match=r"this needs pyarrow, .*: pip install 'pyarrow>="):
+        survey([str(fleet)], SETTINGS, tmp_path / "survey.parquet", jobs=1, say=said.append)
+    assert not said
+    assert not list(tmp_path.iterdir())

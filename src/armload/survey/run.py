@@ -25,7 +25,7 @@ from armload.survey.logs import Log, cells_of, find_logs
 from armload.survey.remarks import copies_among, of_bags, of_copies, of_left_out, of_passed
 from armload.survey.rows import UNUSABLE, as_copy
 from armload.survey.settings import Settings
-from armload.survey.table_file import check_suffix, logs_in_table, whole, write_rows
+from armload.survey.table_file import check_suffix, logs_in_table, require_form, whole, write_rows
 
 _MOST_NAMED = 5  # arms in a sentence: each row has the note of its own
 _MISSING = "missing"  # content of a file that cannot be read
@@ -74,8 +74,10 @@ def survey(
             the table of a survey.
         ArmloadError: the arm or the method is unknown, or a profile, a tool or a model cannot be read.
         OSError: the table or a cell cannot be written.
+        ModuleNotFoundError: what writes the table is not installed; no log is read.
     """
     out, jobs = check_suffix(out), jobs or os.cpu_count() or 1
+    require_form(out)
     folder = cells_of(out)
     named = [Path(p) for p in (settings.tool, settings.tare, settings.profile) if p is not None]
     earlier = _earlier(out)

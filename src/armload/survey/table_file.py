@@ -10,6 +10,7 @@ from typing import Any, TextIO
 
 from armload.errors import UsageError
 from armload.runtime.atomic import replacing
+from armload.runtime.extras import require
 from armload.survey.rows import FLAG, NUMBER, TEXT, WHOLE, columns
 
 SUFFIXES = (".parquet", ".csv", ".json")
@@ -27,6 +28,16 @@ def check_suffix(path: str | Path) -> Path:
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"{path}: unsupported suffix {path.suffix!r}: expected {', '.join(SUFFIXES)}")
     return path
+
+
+def require_form(path: Path) -> None:
+    """See that what writes a table of this form is there, before the work that it is to hold begins.
+
+    Raises:
+        ModuleNotFoundError: pyarrow is not installed; the sentence says how to install it.
+    """
+    if path.suffix.lower() == ".parquet":
+        require("pyarrow")
 
 
 def write_rows(path: str | Path, rows: Sequence[dict[str, Any]], n: int) -> None:

@@ -112,13 +112,12 @@ def _name(session: SessionRecord) -> str:
     return ", ".join(Path(log).name for log in session.name.split(", "))
 
 
-def _most(profile: Profile) -> float:
-    """T that the sessions of one arm seldom reach, however many there are."""
-    from scipy.stats import chi2
-
+def _seldom(session: SessionRecord, profile: Profile) -> bool:
+    """Whether its T is one that the sessions of one arm seldom reach, however many there are."""
+    from armload.posterior.chi_squared import beyond
     from armload.posterior.drift import CHANGED
 
-    return min(CHANGED, float(chi2.isf(_ASKED / len(profile.sessions), 3 * profile.n)))
+    return session.statistic > CHANGED or beyond(session.statistic, 3 * profile.n) < _ASKED / len(profile.sessions)
 
 
 def next_steps(profile: Profile, arm: Arm | None = None) -> tuple[str, ...]:
@@ -133,7 +132,7 @@ def next_steps(profile: Profile, arm: Arm | None = None) -> tuple[str, ...]:
         else f"{_name(session)} fits less well than an arm's own logs do (misfit {session.statistic:.0f}): was it made "
         "by this arm?"
         for session in profile.sessions
-        if session.statistic > _most(profile)
+        if _seldom(session, profile)
     ]
     common = common_gain(profile)
     if common is not None:
