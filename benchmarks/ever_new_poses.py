@@ -1,6 +1,6 @@
 """What a stream and a log say of an arm that goes from pose to pose for minutes, each another, with one payload.
 
-    python benchmarks/ever_new_poses.py [--arms 6] [--seconds 600] [--pushed 12] [--jobs 1] [--page]
+    python benchmarks/ever_new_poses.py [--arms 6] [--seconds 600] [--logs 48] [--pushed 12] [--jobs 1] [--page]
 
 Real-like Pandas (`World.real_like`, the sensors as measured) at 100 Hz that go from one pose to the next and stop
 there, each pose another: *in one place*, 0.6 to 1.8 rad about a pose at most (`MotionSource.stops`), or *everywhere*,
@@ -9,8 +9,9 @@ motion. Every other arm holds a payload of the events' families of 0.2 kg and mo
 each:
 
 - *Nothing happens* for so many seconds: each event is false. Looked at in the first 100 s and after them. The
-  restlessness and the doubts of the run by time, and what `identify` says of the log's first minute, two minutes, five
-  and all of it: how often it is not called calibrated, and by which note.
+  restlessness and the doubts of the run by time.
+- *Logs* of other arms, `--logs` of each kind, to which nothing happens either: what `identify` says of the first 20 s,
+  the first minute and three minutes: how often it is not called calibrated, and by which note.
 - *Pushed*: other arms, 40 s each, `--pushed` of each; a person pushes at the flange with 5 to 40 N for 0.3 to 3 s, in
   any direction. A push counts as called a change if an event falls into it or the second after it; by its last name it
   stays one or is a `return`.
@@ -46,10 +47,11 @@ from armload.simulation import Sensors, World, simulate
 PAGE = ROOT / "docs" / "online_measured.md"
 RATE = 100.0  # [Hz]
 NEW = 100.0  # [s] in which there are fewer poses than the arm's smooth mismatch has features
-LOGS = (60.0, 120.0, 300.0)  # [s] of a log from the beginning, and all of it
+LOGS = (20.0, 60.0, 180.0)  # [s] of a log from its beginning
 LOOKED = (60.0, 100.0, 200.0, 300.0, 600.0)  # [s] at which restlessness is looked at
 SEED = 70_000
 WHERE = ("in one place", "everywhere")
+KINDS = ("quiet", "pushed", "logs")  # of what is asked, each of arms of its own
 
 
 def everywhere(rng: np.random.Generator, seconds: float) -> Motion:
@@ -99,24 +101,30 @@ def quiet(seed: int, where: str, seconds: float) -> dict[str, Any]:
         doubted += bool(identifier.doubts) / RATE
         wrong += one.interval == "calibrated" and not one.low[0] <= mass <= one.high[0]
     identifier.close()
-    said = {}
-    for part in (*(at for at in LOGS if at < seconds), seconds):
-        answer = identify(log.between(0.0, part), "panda", tare=tare)
-        low, high = answer.phi_low[0], answer.phi_high[0]
-        said[f"{part:g}"] = {
-            "calibrated": answer.interval == "calibrated",
-            "inside": bool(low <= mass <= high),
-            "error": float(answer.mass - mass),
-            "notes": [note[:60] for note in answer.notes],
-        }
     return {
         "mass": mass,
         "events": list(events.values()),
         "restlessness": restless,
         "doubted [s]": round(doubted, 1),
         "calibrated and wrong [s]": round(wrong / RATE, 1),
-        "logs": said,
     }
+
+
+def asked_of_logs(seed: int, where: str) -> dict[str, Any]:
+    """What `identify` says of an arm to which nothing happens."""
+    tare, log, mass = made(seed, where, LOGS[-1])
+    said = {}
+    for part in LOGS:
+        answer = identify(log.between(0.0, part), "panda", tare=tare)
+        low, high = answer.phi_low[0], answer.phi_high[0]
+        said[f"{part:g}"] = {
+            "calibrated": answer.interval == "calibrated",
+            "inside": bool(low <= mass <= high),
+            "error": float(answer.mass - mass),
+            "half-width": float(high - low) / 2.0,
+            "notes": [note[:60] for note in answer.notes],
+        }
+    return {"mass": mass, "logs": said}
 
 
 def pushed(seed: int, where: str, seconds: float = 40.0) -> dict[str, Any]:
@@ -154,19 +162,24 @@ def table(found: dict[str, Any]) -> str:
         doubted = sum(one["doubted [s]"] > 0.0 for one in arms)
         share = f"{pushes['called']}, {pushes['kept']} of {pushes['pushes']}"
         rows.append([where, *said, f"{min(restless):.2f} … {max(restless):.2f}", f"{doubted} of {len(arms)}", share])
-        for part in arms[0]["logs"]:
-            of = [one["logs"][part] for one in arms]
-            doubted, inside = (sum(not x[k] for x in of) for k in ("calibrated", "inside"))
-            error = 1e3 * np.mean([abs(x["error"]) for x in of])
-            logs.append([f"{where}, {part} s", str(len(of)), str(doubted), str(inside), f"{error:.1f} g"])
+        for part in found[where]["logs"][0]["logs"]:
+            of = [one["logs"][part] for one in found[where]["logs"]]
+            doubted, outside, wrong = (
+                sum(not x["calibrated"] for x in of),
+                sum(not x["inside"] for x in of),
+                sum(x["calibrated"] and not x["inside"] for x in of),
+            )
+            error, half = (1e3 * np.mean([abs(x[key]) for x in of]) for key in ("error", "half-width"))
+            said = [f"{where}, {part} s", str(len(of)), str(doubted), f"{outside}, {wrong}"]
+            logs.append([*said, f"{error:.1f} ± {half:.1f} g"])
     heads = ["poses", "false in the first 100 s", "false after them", "restlessness", "doubted", "pushes: called, kept"]
     streams = markdown_table(heads, "lrrrrr", rows)
-    heads = ["log", "number", "not called calibrated", "mass outside", "mass error"]
+    heads = ["log", "number", "not called calibrated", "mass outside, and called calibrated", "mass error ± half-width"]
     return f"{streams}\n\n" + markdown_table(heads, "lrrrr", logs)
 
 
 def main() -> None:
-    asked = options(__doc__, arms=6, seconds=600.0, pushed=12, jobs=1, page=False)
+    asked = options(__doc__, arms=6, seconds=600.0, logs=48, pushed=12, jobs=1, page=False)
     if asked.page:
         found = json.loads((RESULTS / "ever_new_poses.json").read_text(encoding="utf-8"))
         write_table(PAGE, "ever new poses", table(found))
@@ -176,16 +189,17 @@ def main() -> None:
     for number, where in enumerate(WHERE):
         for kind, count, task, more in (
             ("quiet", asked.arms, quiet, (asked.seconds,)),
+            ("logs", asked.logs, asked_of_logs, ()),
             ("pushed", asked.pushed, pushed, ()),
         ):
             for k in range(count):
-                seed = SEED + k + 100 * number + 1000 * (kind == "pushed")
+                seed = SEED + k + 100 * number + 1000 * KINDS.index(kind)
                 name = f"{where} {kind} {seed}"
                 tasks.append(Task.of_one(name, key_of(code, name, *more), task, seed, where, *more))
     cells = run_tasks(tasks, ROOT / "out" / "ever_new_poses", jobs=asked.jobs, say=say)
     found = {"seconds": asked.seconds}
     for where in WHERE:
-        of = {k: [c for name, c in cells.items() if name.startswith(f"{where} {k}")] for k in ("quiet", "pushed")}
+        of = {k: [c for name, c in cells.items() if name.startswith(f"{where} {k}")] for k in KINDS}
         n, called, kept = (sum(one[key] for one in of["pushed"]) for key in ("pushes", "called", "kept"))
         pushes = {"pushes": n, "called": called, "kept": kept, "called, 95 %": wilson(called, n)}
         found[where] = of | {"of pushes": pushes}

@@ -434,29 +434,25 @@ def test_the_readme_s_changes_are_those_of_the_committed_benchmark():
 
 def test_what_is_said_of_arms_that_go_to_ever_new_poses_is_what_was_measured(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "benchmarks")
-    from ever_new_poses import table
+    from ever_new_poses import WHERE, table
 
     found, page = result_of("ever_new_poses"), words_of("online_measured")
     assert table(found) in (ROOT / "docs" / "online_measured.md").read_text(encoding="utf-8")
     place, wide = (found[where]["quiet"] for where in ("in one place", "everywhere"))
-    logs = [[log for arm in arms for log in arm["logs"].values()] for arms in (place, wide)]
     assert not any(arm["events"] for arm in place)
-    assert all(log["calibrated"] and log["inside"] for log in logs[0])
     events = [event for arm in wide for event in arm["events"]]
     assert len(events) == 7
     assert all(abs(event["mass"]) < 0.1 for event in events)
     assert len(wide) * found["seconds"] == 3600.0
-    doubted = sum(not log["calibrated"] for log in logs[1])
     assert "seven false events in an hour, all of less than 0.1 kg" in page
-    assert f"then {doubted} of {len(logs[1])} logs are, instead of 12" in page
-    outside = [(k, name) for k, arm in enumerate(wide) for name, log in arm["logs"].items() if not log["inside"]]
-    assert [name for _, name in outside] == ["120", "300", "600"]
-    (arm,) = {k for k, _ in outside}
-    missed = [wide[arm]["logs"][name] for _, name in outside]
-    errors = [abs(1e3 * log["error"]) for log in missed]
-    assert f"wrong by {min(errors):.0f} to {max(errors):.0f} g after two, five and ten minutes" in page
-    assert all(log["calibrated"] for log in missed)
-    pushes = [found[where]["of pushes"] for where in ("in one place", "everywhere")]
+    logs = [[log for arm in found[where]["logs"] for log in arm["logs"].values()] for where in WHERE]
+    inside, doubted = ([sum(log[what] for log in of) for of in logs] for what in ("inside", "calibrated"))
+    assert (len(logs[0]), len(logs[1])) == (144, 144)
+    said = [144 - count for count in doubted]
+    assert f"{said[0]} of 144 logs are doubted *in one place* and {said[1]} *everywhere*" in page
+    held = [100.0 * count / 144.0 for count in inside]
+    assert f"{held[0]:.0f} and {held[1]:.0f} % of the masses are inside" in page
+    pushes = [found[where]["of pushes"] for where in WHERE]
     assert sum(of["called"] for of in pushes) == 4
     assert f"of {sum(of['pushes'] for of in pushes)} light ones" in words_of("online")
     early = [value for arms in (place, wide) for arm in arms for at, value in arm["restlessness"].items()]
@@ -832,10 +828,11 @@ def test_what_stands_beside_the_survey_s_tables_is_in_them():
     called = {gap: found[1] for gap, found in result_of("loose_grippers")["called"].items()}
     assert (called["0"], called["5"]) == (0.0, 0.5)
     assert called["10"] > 0.9  # nearly all
-    peaks = [(one["kind"], one["file [MB]"], one["peak [MB]"]) for one in result_of("long_logs")["logs"]]
-    (bag,) = (peak for kind, size, peak in peaks if kind == "mcap" and size > 2000)
-    assert f"A bag of 2 GB takes {bag:.0f} MB, and no kind more than 480" in page
-    assert 470 < max(peak for *_, peak in peaks) < 480
+    logs = result_of("long_logs")["logs"]
+    (bag,) = (one for one in logs if one["log [s]"] == 3600.0)
+    assert (bag["kind"], round(bag["file [MB]"], -2)) == ("mcap", 1500.0)
+    assert f"A bag of an hour and 1.5 GB takes {bag['peak [MB]']:.0f} MB, and no kind more than 620 for half an" in page
+    assert 610 < max(one["peak [MB]"] for one in logs if one["log [s]"] <= 1800.0) < 620
 
 
 def test_the_short_numbers_of_streams_are_in_the_committed_results():
