@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from armload.arms import Arm
 from armload.identification.thresholds import NOMINAL
+from armload.inertia import Z95
 from armload.posterior.scales import AnotherArm, Drift, Tilt
 from armload.posterior.tilt import MAY_LEAN
 
@@ -106,4 +107,12 @@ def driven_by_friction(joints: tuple[int, ...]) -> str:
         f"friction drives joint{'s' if several else ''} {which} where it must brake {'them' if several else 'it'}: the "
         f"sign of {'their' if several else 'its'} torque is turned, or that of position and velocity; turn it back in "
         "the log and in its tare"
+    )
+
+
+def scaled_torques(arm: str, scale: float, std: float) -> str:
+    """That a log's torques are another multiple of what the arm's own links need."""
+    return (
+        f"the torques are {scale:.2f} ± {Z95 * std:.2f} times what the links of {arm} need, and what is held seems too "
+        "heavy or too light by as much: check that tau is in N·m, in the tare, too, and that this arm made the log"
     )

@@ -16,6 +16,7 @@ from armload.identification.arm_notes import held_against
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
+from armload.identification.own_scale import OwnScale, own_scale
 from armload.identification.shown_friction import driven_joints, is_frictionless
 from armload.identification.thresholds import LARGEST_OFFSET, MISFIT, MOVES
 from armload.inertia import distance_to_body, is_consistent
@@ -62,6 +63,7 @@ class Found(NamedTuple):
         estimate's.
     offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
     backwards: joints, from 1, that friction surely drives where it must brake them, of such a method.
+    own_scale: of the torques, of what the arm's own links need, of a method that knows the arm's.
     frictionless: whether no joint that moves shows friction, of a method that knows the arm's.
     strange_links: by how much the arm's links differ from the model's (`ArmMismatch.links`), where that is too much.
     unknown_friction: whether the torques hold unknown gear friction; `friction_found`: that they did.
@@ -91,6 +93,7 @@ class Found(NamedTuple):
     unprojected: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     offset_ratio: float = 0.0
     backwards: tuple[int, ...] = ()
+    own_scale: OwnScale | None = None
     frictionless: bool = False
     strange_links: float = 0.0
     unknown_friction: bool = False
@@ -191,6 +194,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         unprojected=identifier.unprojected,
         offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
         backwards=() if posterior is None else driven_joints(posterior, recording, kappa),
+        own_scale=None if posterior is None else own_scale(posterior),
         frictionless=posterior is not None and is_frictionless(posterior, recording),
         strange_links=0.0 if mismatch is None or mismatch.torque == "motor" else _strange(mismatch.links),
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",

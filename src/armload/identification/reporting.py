@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.identification.answer import Identification, body_of, is_removal
-from armload.identification.arm_notes import another_model, arm_changed, driven_by_friction, gravity_turned, leaning
+from armload.identification.arm_notes import (
+    another_model,
+    arm_changed,
+    driven_by_friction,
+    gravity_turned,
+    leaning,
+    scaled_torques,
+)
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
@@ -114,7 +121,8 @@ def _doubts(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> 
         leans = leaning(arm, found.tilt, "motor" if arm.motor_torque or found.friction_found else "link")
     driven = driven_by_friction(found.backwards) if found.backwards else None
     computed = COMPUTED if found.frictionless and arm.motor_torque else None  # gears rub in every motor's current
-    doubts = driven, computed, leans, _doubt(found, arm, mass_determined, relative_to)
+    scaled = scaled_torques(arm.name, *found.own_scale) if found.own_scale and found.own_scale.is_another else None
+    doubts = driven, computed, leans, scaled, _doubt(found, arm, mass_determined, relative_to)
     return [doubt for doubt in doubts if doubt is not None]
 
 

@@ -31,6 +31,10 @@ LEAST_SEEN = 1e-3
 # but for 4 in one window of a KUKA's unfiltered velocities; with a wrist torque's sign turned 1 to 140
 # (test_friction_that_drives_a_joint_is_told_by_the_joint, `benchmarks/wrong_logs.py`)
 BACKWARDS = 3.0
+# [standard deviations] by which a log's torques are another multiple of what the arm's own links need: that of one
+# sound log in a thousand is farther from 1. Torques that are 0.74 or 1.3 times as large are farther, where links are
+# known well (test_torques_in_another_unit_are_told_by_the_links_that_they_carry)
+OTHER_SCALE = 3.2905
 # [rad] a joint that stays within so much stands: friction below stiction holds it
 MOVES = 0.05
 # times that a log tells a parameter worse under the weak prior: beyond, it leaves it to the learned one. The factor by
