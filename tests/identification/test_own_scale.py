@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from armload import arm, identify
+from armload.identification.last_equations import LastEquations
 from armload.identification.own_scale import own_scale
 from armload.motion import random_motion
 from armload.payloads import test_payload as box_of_the_examples
@@ -30,7 +31,7 @@ def told(name: str, log: Recording, tare: Recording | None = None):
     """The scale that the arm's own links tell."""
     identifier = HybridIdentifier(arm(name), tare)
     identifier.run(log)
-    return own_scale(identifier)
+    return own_scale(LastEquations.of(identifier))
 
 
 def times(log: Recording, factor: float) -> Recording:

@@ -16,6 +16,7 @@ from armload.identification.arm_notes import held_against
 from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
+from armload.identification.last_equations import LastEquations
 from armload.identification.own_scale import OwnScale, own_scale
 from armload.identification.shown_friction import driven_joints, is_frictionless
 from armload.identification.thresholds import LARGEST_OFFSET, MISFIT, MOVES
@@ -182,6 +183,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         estimate = replace(estimate, covariance=np.diag(std**2))
     mismatch = identifier.mismatch
     kappa = identifier.kappa if isinstance(identifier, HybridIdentifier) else None
+    last = None if posterior is None else LastEquations.of(posterior)
     # where the payload prior is learned, so are error bars that allow for friction
     unknown = identifier.payload_prior is None and not arm.motor_torque
     return Found(
@@ -193,9 +195,9 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         weak_std=identifier.weak_std,
         unprojected=identifier.unprojected,
         offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
-        backwards=() if posterior is None else driven_joints(posterior, recording, kappa),
-        own_scale=None if posterior is None else own_scale(posterior),
-        frictionless=posterior is not None and is_frictionless(posterior, recording),
+        backwards=() if last is None else driven_joints(last, recording, kappa),
+        own_scale=None if last is None else own_scale(last),
+        frictionless=last is not None and is_frictionless(last, recording),
         strange_links=0.0 if mismatch is None or mismatch.torque == "motor" else _strange(mismatch.links),
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
         known_arm_std=identifier.known_arm_std,

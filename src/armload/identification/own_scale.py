@@ -21,11 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armload.identification.last_equations import LastEquations
 from armload.identification.thresholds import OTHER_SCALE
-from armload.posterior import PosteriorLeastSquares
-from armload.posterior.problem import Problem
-from armload.regression import solution_prior_std
-from armload.runtime.one_thread import one_thread
 
 
 class OwnScale(NamedTuple):
@@ -40,19 +37,17 @@ class OwnScale(NamedTuple):
         return abs(self.scale - 1.0) > OTHER_SCALE * self.std
 
 
-@one_thread()
-def own_scale(found: PosteriorLeastSquares) -> OwnScale | None:
+def own_scale(last: LastEquations) -> OwnScale | None:
     """The scale of the torques of a run that has ended, and of its tare; None: torque is motor current, or tells none.
 
     Args:
-        found: the identifier that has answered for the log.
+        last: of the log.
     """
-    stream, arm = found.stream, found.arm
+    found, problem, known = last
+    arm = found.arm
     if found.posterior.gears or arm.motor_torque:
         return None
-    problem = Problem([*stream.tares, stream.accumulated()], solution_prior_std(arm), None, stream.noise)
-    known = problem.posterior(problem.scales(found.posterior.scales))
-    std = stream.correction.prior_std[-10 * arm.n :]
+    std = found.stream.correction.prior_std[-10 * arm.n :]
     uncertain = std > 0.0
     links = np.arange(problem.eta.stop - 10 * arm.n, problem.eta.stop)[uncertain]
     m, P, S = known.mean[links], known.covariance[np.ix_(links, links)], std[uncertain] ** 2

@@ -15,51 +15,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import FRICTION_WIDTH
+from armload.identification.last_equations import LastEquations
 from armload.identification.thresholds import BACKWARDS, LEAST_SEEN, MOVES
-from armload.posterior import PosteriorLeastSquares
 from armload.posterior.calibration import KAPPA_UNKNOWN
-from armload.posterior.problem import Problem
 from armload.recording import Recording, span
-from armload.regression import payload_prior_std
 from armload.regression.mismatch import PER_JOINT
 from armload.runtime.one_thread import one_thread
 
 _SAMPLES = 200  # of a log's path: friction is a smooth function of the velocity
 
 
-def driven_joints(found: PosteriorLeastSquares, recording: Recording, kappa: float | None) -> tuple[int, ...]:
+def driven_joints(last: LastEquations, recording: Recording, kappa: float | None) -> tuple[int, ...]:
     """Joints, from 1, that move, and that friction surely drives.
 
-    kappa: by how much the physics overrates the log's evidence; None: not known. Of motor currents, which are mostly
-        friction, it says nothing of that.
+    last: of the log. kappa: by how much the physics overrates its evidence; None: not known. Of motor currents, which
+        are mostly friction, it says nothing of that.
     """
-    motor = found.posterior.torque == "motor"
+    motor = last.identifier.posterior.torque == "motor"
     sure = BACKWARDS * (1.0 if motor else np.sqrt(kappa or KAPPA_UNKNOWN))
     moves = span(recording.q) > MOVES
     if not moves.any():
         return ()
-    friction, std = _friction(found, recording)
+    friction, std = _friction(last, recording)
     return tuple((np.flatnonzero(moves & (friction < -sure * std)) + 1).tolist())
 
 
-def is_frictionless(found: PosteriorLeastSquares, recording: Recording) -> bool:
+def is_frictionless(last: LastEquations, recording: Recording) -> bool:
     """Whether half of the joints move at least, and no such joint shows friction."""
-    correction, moves = found.stream.correction, span(recording.q) > MOVES
+    found, moves = last.identifier, span(recording.q) > MOVES
+    correction = found.stream.correction
     if 2 * moves.sum() < len(moves):
         return False
     least = LEAST_SEEN * correction.effort
     if (np.abs(correction.coulomb(found.posterior.eta)) > least)[moves].any():
         return False
-    return not (np.abs(_friction(found, recording)[0]) > least)[moves].any()
+    return not (np.abs(_friction(last, recording)[0]) > least)[moves].any()
 
 
 @one_thread()
-def _friction(found: PosteriorLeastSquares, recording: Recording) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _friction(last: LastEquations, recording: Recording) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """f (n,) [N·m] of the joints along a log, and its standard deviation; 0 of one that stands still."""
-    stream, arm = found.stream, found.arm
+    stream, arm = last.identifier.stream, last.identifier.arm
     correction, features = stream.correction, stream.features
-    problem = Problem([*stream.tares, stream.accumulated()], payload_prior_std(arm), None, stream.noise)
-    known, E = problem.posterior(problem.scales(found.posterior.scales)), problem.selections[-1]
+    known, E = last.known, last.problem.selections[-1]
     rows = np.linspace(0, len(recording) - 1, min(_SAMPLES, len(recording))).astype(int)
     dq, tau = recording.dq[rows], recording.tau[rows]
     path, j = np.maximum(np.abs(dq).sum(axis=0), np.finfo(float).tiny), np.arange(arm.n)
