@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from armload import arm, identify
@@ -11,7 +12,7 @@ from armload.identification.last_equations import LastEquations
 from armload.identification.own_scale import own_scale
 from armload.motion import random_motion
 from armload.payloads import test_payload as box_of_the_examples
-from armload.posterior import HybridIdentifier
+from armload.posterior import HybridIdentifier, learn_profile
 from armload.recording import Recording, read_recording
 from armload.simulation import Sensors, World, simulate
 
@@ -68,6 +69,15 @@ def test_a_real_panda_s_links_need_the_torques_that_it_shows(real_data):
     for factor, one in found.items():
         assert one is not None
         assert one.scale == pytest.approx(factor, abs=0.05)
+
+
+def test_a_scale_that_a_known_weight_has_told_is_believed():
+    log, tare = (times(one, 1.12) for one in recorded("panda", 703))
+    profile = learn_profile(arm("panda"), [tare])
+    told_so = replace(profile, gain=np.full(7, 0.12), gain_std=0.003)
+    without, believed = (identify(log, "panda", profile=one).notes for one in (profile, told_so))
+    assert any("times what the links" in note for note in without)
+    assert not any("times what the links" in note for note in believed)
 
 
 def test_motor_currents_do_not_tell_their_scale():

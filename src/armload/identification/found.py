@@ -64,7 +64,8 @@ class Found(NamedTuple):
         estimate's.
     offset_ratio: how many times the arm's torque offsets are what is expected of them, where that is too often.
     backwards: joints, from 1, that friction surely drives where it must brake them, of such a method.
-    own_scale: of the torques, of what the arm's own links need, of a method that knows the arm's.
+    own_scale: of the torques, of what the arm's own links need, of a method that knows the arm's; None where a known
+        weight has told it.
     frictionless: whether no joint that moves shows friction, of a method that knows the arm's.
     strange_links: by how much the arm's links differ from the model's (`ArmMismatch.links`), where that is too much.
     unknown_friction: whether the torques hold unknown gear friction; `friction_found`: that they did.
@@ -183,6 +184,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         estimate = replace(estimate, covariance=np.diag(std**2))
     mismatch = identifier.mismatch
     kappa = identifier.kappa if isinstance(identifier, HybridIdentifier) else None
+    gain_known = asked.profile is not None and asked.profile.gain_std is not None
     last = None if posterior is None else LastEquations.of(posterior)
     # where the payload prior is learned, so are error bars that allow for friction
     unknown = identifier.payload_prior is None and not arm.motor_torque
@@ -196,7 +198,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         unprojected=identifier.unprojected,
         offset_ratio=0.0 if mismatch is None else _offset_ratio(mismatch, recording),
         backwards=() if last is None else driven_joints(last, recording, kappa),
-        own_scale=None if last is None else own_scale(last),
+        own_scale=None if last is None or gain_known else own_scale(last),
         frictionless=last is not None and is_frictionless(last, recording),
         strange_links=0.0 if mismatch is None or mismatch.torque == "motor" else _strange(mismatch.links),
         unknown_friction=unknown and mismatch is not None and mismatch.torque == "motor",
@@ -209,7 +211,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         exchanged=posterior is not None and posterior.exchanged,
         kappa=kappa,
         gain_std=None if posterior is None else posterior.posterior.gain_std,
-        gain_known=asked.profile is not None and asked.profile.gain_std is not None,
+        gain_known=gain_known,
         known=asked.known,
         log_only=None if posterior is None else posterior.log_only,
         denies_family=isinstance(identifier, HybridIdentifier) and identifier.denies_family,
