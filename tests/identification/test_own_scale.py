@@ -10,6 +10,7 @@ import pytest
 from armload import arm, identify
 from armload.identification.last_equations import LastEquations
 from armload.identification.own_scale import own_scale
+from armload.lab.episodes import draw_episodes, simulate_episodes
 from armload.motion import random_motion
 from armload.payloads import test_payload as box_of_the_examples
 from armload.posterior import HybridIdentifier, learn_profile
@@ -62,6 +63,16 @@ def test_the_scale_that_links_tell_is_that_of_the_torques_within_its_error(name)
     assert twelve_percent.scale / one.scale == pytest.approx(1.12, abs=0.02)
 
 
+def test_the_scale_of_a_sound_arm_is_no_doubt():
+    """One whose links make it 1.06, by four of its standard deviations."""
+    panda = arm("panda")
+    log = list(simulate_episodes(draw_episodes(panda, "reference", 2, seed=77, motions=3)))[1]
+    seen = told("panda", log.run, log.tare)
+    assert seen is not None
+    assert seen.scale - 1.0 > 3.5 * seen.std
+    assert not seen.is_another
+
+
 def test_a_real_panda_s_links_need_the_torques_that_it_shows(real_data):
     log = read_recording(real_data / "panda_unloaded_1khz.csv", arm("panda"))
     found = {factor: told("panda", times(log, factor)) for factor in (1.0, POUND_FEET, 1.3)}
@@ -72,9 +83,9 @@ def test_a_real_panda_s_links_need_the_torques_that_it_shows(real_data):
 
 
 def test_a_scale_that_a_known_weight_has_told_is_believed():
-    log, tare = (times(one, 1.12) for one in recorded("panda", 703))
+    log, tare = (times(one, 1.25) for one in recorded("panda", 703))
     profile = learn_profile(arm("panda"), [tare])
-    told_so = replace(profile, gain=np.full(7, 0.12), gain_std=0.003)
+    told_so = replace(profile, gain=np.full(7, 0.25), gain_std=0.003)
     without, believed = (identify(log, "panda", profile=one).notes for one in (profile, told_so))
     assert any("times what the links" in note for note in without)
     assert not any("times what the links" in note for note in believed)

@@ -14,7 +14,7 @@ distributed = pytest.importorskip("distributed")
 
 @pytest.fixture
 def cluster():
-    with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as made:
+    with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as made:
         yield made
 
 

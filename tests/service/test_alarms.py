@@ -205,7 +205,9 @@ def dribbling():
                 threading.Thread(target=dribble, args=(first,), daemon=True).start()
                 second, _ = server.accept()
                 with second:
-                    taken.append(second.recv(65536))
+                    taken.append(b"")
+                    while not taken[0].endswith(b"}"):  # head and body may come one after the other
+                        taken[0] += second.recv(65536)
                     second.sendall(b"HTTP/1.0 200 OK\r\nContent-Length: 0\r\n\r\n")
 
         def dribble(connection):

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armload.identification.last_equations import LastEquations
-from armload.identification.thresholds import OTHER_SCALE
+from armload.identification.thresholds import LINKS_ALIKE, OTHER_SCALE
 
 
 class OwnScale(NamedTuple):
@@ -34,7 +34,7 @@ class OwnScale(NamedTuple):
     @property
     def is_another(self) -> bool:
         """Whether it surely is not 1."""
-        return abs(self.scale - 1.0) > OTHER_SCALE * self.std
+        return abs(self.scale - 1.0) > OTHER_SCALE * float(np.hypot(self.std, LINKS_ALIKE))
 
 
 def own_scale(last: LastEquations) -> OwnScale | None:
