@@ -21,10 +21,8 @@ def status_of(trouble: tuple[bytes, str] | None, estimate: OnlineEstimate | None
     elif estimate is None:
         level, text = DiagnosticStatus.WARN, "nothing heard yet"
     elif why is not None or estimate.notes:
-        level, text = (
-            DiagnosticStatus.WARN,
-            "; ".join(dict.fromkeys(([] if why is None else [why]) + list(estimate.notes))),
-        )
+        said = dict.fromkeys([*([] if why is None else [why]), *estimate.notes])  # each once
+        level, text = DiagnosticStatus.WARN, "; ".join(said)
     elif estimate.held:
         text = f"{estimate.phi[0]:.3f} kg, {estimate.interval}"
     return DiagnosticStatus(level=level, message=text)

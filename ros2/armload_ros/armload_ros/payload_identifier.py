@@ -177,9 +177,8 @@ class PayloadIdentifier(LifecycleNode):
         if sample is None:
             return
         self._heard, self._trouble = time.monotonic(), ""
-        received = int(
-            info["received_timestamp"]
-        )  # by the middleware, which may not tell; then it waited behind others
+        received = int(info["received_timestamp"])  # by the middleware, 0 where it does not tell
+        # and since then it waited behind others
         arrived = self._heard - (max(0, time.time_ns() - received) / 1e9 if received else 0.0)
         if self._states.has_velocities:
             self._take_sample(sample, arrived)
