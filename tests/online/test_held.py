@@ -12,7 +12,7 @@ from armload.online.judgement import Judgement
 def judged():
     """Whether something is held after masses ± standard deviations [kg], one after the other."""
     panda = arm("panda")
-    judgement, run = Judgement(panda, None), RecursiveLeastSquares(panda)
+    judgement, run = Judgement(panda, None, tared=False), RecursiveLeastSquares(panda)
 
     def after(*masses, concluded=False):
         out = []

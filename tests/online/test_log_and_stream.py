@@ -8,16 +8,19 @@ import pytest
 
 from armload.arms import arm, payload_regressor
 from armload.errors import IdentificationError
-from armload.identification import identify
+from armload.identification import identify, with_tool
 from armload.identification.tare_age import DAY
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
 from armload.online import OnlineIdentifier
+from armload.payloads import Payload
 from armload.payloads import test_payload as make_payload
+from armload.payloads.uncertainty import Uncertainty
 from armload.recording import Recording
 from armload.simulation import World, simulate
 
 TOOL = InertialParameters.from_com(0.4, (0.0, 0.01, 0.05), np.diag([1e-3, 1e-3, 5e-4]))
+WEIGHED = Payload("gripper", TOOL, uncertainty=Uncertainty(0.1, 0.005, 0.2))
 
 
 @cache
@@ -60,10 +63,10 @@ def case(kind, panda_logs, same_motion):
     if kind == "gaps":
         run = with_a_gap(run)
     wants_tare = kind in ("tare", "old tare", "same motion", "motor torque")
-    return robot, run, tare if wants_tare else None, TOOL if kind == "tool" else None
+    return robot, run, tare if wants_tare else None, {"tool": TOOL, "weighed tool": WEIGHED}.get(kind)
 
 
-KINDS = ("untared", "tare", "old tare", "same motion", "tool", "30 Hz", "gaps", "motor torque")
+KINDS = ("untared", "tare", "old tare", "same motion", "tool", "weighed tool", "30 Hz", "gaps", "motor torque")
 CASES = [(kind, None) for kind in KINDS]
 CASES += [pytest.param(kind, "map-gp", marks=() if kind == "untared" else pytest.mark.full) for kind in KINDS]
 
@@ -73,7 +76,7 @@ def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, 
     robot, run, tare, tool = case(kind, panda_logs, same_motion)
     age = 9 * DAY if kind == "old tare" else 0.0
     answer = identify(run, robot, tare=tare, tool=tool, method=method, tare_age=age)
-    carrying = robot if tool is None else robot.with_payload(robot.in_frame(tool))
+    carrying = robot if tool is None else with_tool(robot, tool)
     stream = OnlineIdentifier(carrying, tare, method, tare_age=age)
     for sample in run:
         stream.update(*sample)
@@ -91,6 +94,44 @@ def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, 
     assert end.same_arm_assumed == answer.same_arm_assumed == (kind == "motor torque")
     for ours, theirs in ((end.low, answer.phi_low), (end.high, answer.phi_high)):
         np.testing.assert_allclose((ours - theirs) / unit, 0.0, rtol=0, atol=1e-5)
+
+
+def test_a_stream_is_as_unsure_as_its_tool_until_its_empty_run_has_weighed_it(panda_logs):
+    """The error of a tool that is on all the time is in what the empty arm shows, too, and cancels then."""
+    robot, run, tare = panda_logs
+    once_taken = Recording(tare.t[-1] + 0.005 + run.t, run.q, run.dq, run.tau)
+    with_tools = [
+        Recording(part.t, part.q, part.dq, part.tau + robot.with_payload(TOOL).torque(*motion) - robot.torque(*motion))
+        for part in (tare, once_taken)
+        for motion in [(part.q, part.dq, np.gradient(part.dq, part.t, axis=0))]
+    ]
+    ends = {}
+    for name, carrying in (("exact", robot.with_payload(TOOL)), ("weighed", with_tool(robot, WEIGHED))):
+        stream, ends[name] = OnlineIdentifier(carrying), []
+        for part in with_tools:
+            for sample in part:
+                last = stream.update(*sample)
+            ends[name].append(last)
+        stream.close()
+    (empty, loaded), (empty_weighed, loaded_weighed) = ends["exact"], ends["weighed"]
+    assert empty.relative_to == empty_weighed.relative_to == "tool"
+    added = WEIGHED.covariance
+    np.testing.assert_allclose(empty_weighed.covariance - empty.covariance, added, atol=1e-3 * added.max())
+    assert loaded.relative_to == loaded_weighed.relative_to == "before"
+    np.testing.assert_allclose(loaded_weighed.std, loaded.std, rtol=0.05)
+
+
+@pytest.mark.parametrize("age", [None, 0.0])
+def test_a_stream_doubts_its_bars_while_its_tool_s_inertia_is_assumed(panda_logs, age):
+    robot, run, tare = panda_logs
+    tool = Payload.without_inertia("tool", TOOL.mass, TOOL.com)
+    stream = OnlineIdentifier(with_tool(robot, tool), None if age is None else tare)
+    for sample in run:
+        last = stream.update(*sample)
+    stream.close()
+    untared = age is None
+    assert (last.interval == "approximate") is untared
+    assert any("tool tool: the inertia is not given" in note for note in last.notes) is untared
 
 
 @pytest.mark.parametrize("method", [None, "map-gp"])

@@ -11,7 +11,7 @@ from armload import Recording, arm, read_payload, read_recording
 from armload.arms import Arm
 from armload.devices.ros2 import Effort
 from armload.errors import UsageError
-from armload.identification import check_usable, plausible_tool
+from armload.identification import check_usable, plausible_tool, with_tool
 from armload.identification.known_options import KnownOptions
 from armload.identification.tare_age import age_of, seconds_of
 from armload.inertia import InertialParameters
@@ -102,9 +102,10 @@ class Parameters:
         """The arm without a tool, a new one each time."""
         return arm(self.value("robot"), self.value("frame") or None, gravity=tuple(self.value("gravity")))
 
-    def tool(self, bare: Arm) -> InertialParameters | None:
-        """What is mounted and known, about the arm's frame."""
-        return self._body("tool", bare)
+    def with_tool(self, bare: Arm) -> Arm:
+        """The arm with what is mounted and known."""
+        path = self.value("tool")
+        return bare if path in ("", NOTHING) else with_tool(bare, read_payload(path))
 
     def mounted(self, bare: Arm) -> InertialParameters | None:
         """What answers lack; None: nobody says."""

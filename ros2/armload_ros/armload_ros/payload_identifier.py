@@ -144,8 +144,7 @@ class PayloadIdentifier(LifecycleNode):
         read = as_declared({name: self.get_parameter(name).value for name in DEFAULTS})
         self.parameters = given = Parameters(read.__getitem__)  # what is set later counts from the next configure on
         bare = given.bare_arm()
-        self._bare, tool = bare, given.tool(bare)
-        robot = bare if tool is None else bare.with_payload(tool)
+        self._bare, robot = bare, given.with_tool(bare)
         self._states = JointStates(robot, "joint_states", given.effort(robot), needs_velocities=False)
         self._telling = None
         log = given.tare(robot)

@@ -16,7 +16,7 @@ from armload.arms.description import read_chain
 from armload.arms.limits import Limits
 from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, placement_of
 from armload.errors import ArmError
-from armload.inertia import InertialParameters, from_order, parameters_only
+from armload.inertia import InertialParameters, Inexact, from_order, parameters_only
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 # [m/s²] least and most at a base that an arm works on: the Moon has 1.62, and a base on the Earth that brakes or turns
@@ -44,6 +44,7 @@ class Arm:
         gravity: gravity in the base's axes (3,) [m/s²]; a tilted base has a tilted gravity.
         attached: a payload that counts as part of the arm (a hand, say), about `frame`; from another frame of the last
             link that it names it is moved there.
+        attached_error: how far that may be off; None: not at all. Torque and limits do not depend on it.
         links: inertial parameters (n, 10) of the moving links about their joint frames, where they are to differ from
             the URDF's.
         rated_payload: the maker's rated payload [kg], if known.
@@ -64,6 +65,7 @@ class Arm:
     frame: str | None = None
     gravity: tuple[float, float, float] = STANDARD_GRAVITY
     attached: InertialParameters | None = field(default=None, repr=False)
+    attached_error: Inexact | None = field(default=None, repr=False)
     links: NDArray[np.float64] | None = field(default=None, repr=False)
     rated_payload: float | None = field(default=None, repr=False)
     acceleration: tuple[float, ...] | None = field(default=None, repr=False)
@@ -97,6 +99,8 @@ class Arm:
         object.__setattr__(self, "_rigid", chain.rigid)
         if self.attached is not None and self.attached.frame in set(chain.frames) - {chain.frame}:
             object.__setattr__(self, "attached", replace(self, attached=None).in_frame(self.attached))
+        if self.attached is None:
+            object.__setattr__(self, "attached_error", None)
         _ = self._model  # fail now, not at the first sample
 
     def __getstate__(self) -> dict[str, Any]:
@@ -163,17 +167,19 @@ class Arm:
         turned = pin.exp3(np.asarray(angles, dtype=float) @ self.horizontal) @ np.asarray(self.gravity)
         return replace(self, gravity=tuple(turned.tolist()))
 
-    def with_payload(self, payload: InertialParameters) -> Arm:
+    def with_payload(self, payload: InertialParameters, error: Inexact | None = None) -> Arm:
         """The arm with a payload counted as part of it; payloads add up.
 
         Args:
             payload: about `frame`, or about another frame of the last link that it names.
+            error: how far it may be off, about `frame`; None: not at all.
 
         Raises:
             ArmError: joints lie between the frame that it names and `frame`.
         """
-        held = self.as_payload(payload)
-        return replace(self, attached=held if self.attached is None else self.attached + held)
+        held, before = self.as_payload(payload), self.attached_error
+        off = before if error is None else error if before is None else before + error
+        return replace(self, attached=held if self.attached is None else self.attached + held, attached_error=off)
 
     def with_links(self, links: ArrayLike) -> Arm:
         """The arm with other inertial parameters (n, 10) of its moving links, before any attached payload."""

@@ -15,6 +15,7 @@ from armload.inertia import InertialParameters
 def arm_to_json(arm: Arm) -> dict[str, Any]:
     """All that makes an arm, for another process."""
     facts = {field.name: getattr(arm, field.name) for field in dataclasses.fields(arm)}
+    facts["attached_error"] = None  # of no use to a reader
     if arm.attached is not None:
         facts["attached"] = parameters_to_json(arm.attached)
     if arm.links is not None:

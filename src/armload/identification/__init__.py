@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from armload.identification.identify_log import check_usable, identify
     from armload.identification.left_out import LEFT_OUT
     from armload.identification.methods import METHODS, Method
-    from armload.identification.one_payload import known_of, plausible_known, plausible_tool
+    from armload.identification.mounted_tool import plausible_tool, with_tool
+    from armload.identification.one_payload import known_of, plausible_known
     from armload.identification.plausibility import check_plausible
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "known_of",
     "plausible_known",
     "plausible_tool",
+    "with_tool",
 ]
 
 __getattr__, __dir__ = on_first_use(__name__)

@@ -20,7 +20,7 @@ from armload.identification.last_equations import LastEquations
 from armload.identification.own_scale import OwnScale, own_scale
 from armload.identification.shown_friction import driven_joints, is_frictionless
 from armload.identification.thresholds import LARGEST_OFFSET, MISFIT, MOVES
-from armload.inertia import distance_to_body, is_consistent
+from armload.inertia import Inexact, distance_to_body, is_consistent
 from armload.posterior import HybridIdentifier, Known, PosteriorLeastSquares, Profile
 from armload.posterior.restless import most_restless
 from armload.posterior.scales import AnotherArm, Drift, Tilt
@@ -122,14 +122,11 @@ class Found(NamedTuple):
         """Whether a body explains what the log says."""
         return explained(self.estimate, self.unprojected)
 
-    def with_error(self, covariance: NDArray[np.float64], calibrated: bool = True) -> Found:
-        """The same with one more error of phi, of that covariance (10, 10): of a tool that is not known exactly.
-
-        calibrated: whether that covariance is.
-        """
-        unprojected, log_only = (x and (x[0], x[1] + covariance) for x in (self.unprojected, self.log_only))
-        estimate = replace(self.estimate, covariance=self.estimate.covariance + covariance)
-        calibrated = calibrated and self.calibrated
+    def with_error(self, error: Inexact) -> Found:
+        """The same with one more error of phi: of a tool that is not known exactly."""
+        unprojected, log_only = (x and (x[0], x[1] + error.covariance) for x in (self.unprojected, self.log_only))
+        estimate = replace(self.estimate, covariance=self.estimate.covariance + error.covariance)
+        calibrated = error.calibrated and self.calibrated
         return self._replace(estimate=estimate, unprojected=unprojected, log_only=log_only, calibrated=calibrated)
 
     def less(self, tool: NDArray[np.float64]) -> Found:

@@ -10,17 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from armload.arms import Arm, rated_mass
+from armload.arms import Arm
 from armload.errors import IdentificationError
 from armload.identification.answer import Identification
 from armload.identification.choice import choose
 from armload.identification.found import Asked, found_in
+from armload.identification.mounted_tool import in_frame, mounted_on, plausible_mass
 from armload.identification.reporting import answered
-from armload.identification.thresholds import DECISIVE, HEAVIEST
+from armload.identification.thresholds import DECISIVE
 from armload.inertia import HELD, InertialParameters
-from armload.payloads import INERTIA_ASSUMED, Payload
+from armload.payloads import Payload
 from armload.posterior import Known, KnownBody, KnownCentre, KnownMass, Profile
 from armload.recording import Recording
 
@@ -47,18 +48,17 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
     without = bare if asked.profile is None else "profile"
     if mounted is None:
         relative_to = without if tare is None else "tare"
-        return answered(found_in(recording, arm, tare, asked), arm, recording, tared, relative_to, notes)
-    known = plausible_tool(arm.in_frame(mounted.parameters if isinstance(mounted, Payload) else mounted), arm)
-    unsure, error, trusted = None, np.zeros((10, 10)), True
-    if isinstance(mounted, Payload):
-        error = _in_frame(arm, mounted.covariance, mounted.parameters.frame)
-        trusted = mounted.measured is None or mounted.measured.calibrated
-        if not mounted.inertia_known:
-            notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
-            unsure = known
+        found = found_in(recording, arm, tare, asked)
+        if arm.attached_error is not None and not tared:  # else it is in both logs, or in the profile's
+            found, notes = found.with_error(arm.attached_error), (*notes, *arm.attached_error.notes)
+        return answered(found, arm, recording, tared, relative_to, notes)
+    known, error = mounted_on(arm, mounted)
+    unsure = known if isinstance(mounted, Payload) and not mounted.inertia_known else None
+    notes = (*notes, *error.notes)
     if tare is None and asked.profile is None:
-        arm = arm.with_payload(known)
-        found = found_in(recording, arm, None, asked).with_error(error, trusted)
+        arm = arm.with_payload(known, error)
+        assert arm.attached_error is not None
+        found = found_in(recording, arm, None, asked).with_error(arm.attached_error)
         return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
     carried, sure = _carries(arm, known, tare, asked.profile)
     before = "at the tare" if tare is not None else "in the profile's logs"
@@ -71,7 +71,7 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
     else:
         both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
         found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
-        found = found.with_error(error, trusted)
+        found = found.with_error(error)
         note, otherwise = f"the tool was mounted {since}: the answer is what was added since, less the tool", known.phi
         if found.estimate.phi[0] < -HELD * found.estimate.std[0]:
             note = (
@@ -83,22 +83,6 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
     who = "tare" if tare is not None else "profile"
     note = f"it seems that {note}; the {who} does not tell for sure, the intervals hold the other case, too"
     return answered(found, arm, recording, tared, relative_to, (*notes, note), otherwise, unsure)
-
-
-def _in_frame(arm: Arm, covariance: NDArray[np.float64], frame: str | None) -> NDArray[np.float64]:
-    """A covariance (10, 10) of phi about the arm's payload frame, from another."""
-    T = np.column_stack([arm.in_frame(InertialParameters(e, frame)).phi for e in np.eye(10)])
-    return T @ covariance @ T.T
-
-
-def plausible_tool(tool: InertialParameters, arm: Arm) -> InertialParameters:
-    """The tool, if an arm can carry so much.
-
-    Raises:
-        IdentificationError: it weighs more than three times the rated payload: in grams, say.
-    """
-    plausible_mass(tool.mass, "the tool weighs", arm)
-    return tool
 
 
 def known_of(
@@ -125,7 +109,7 @@ def known_of(
                 f"the body {body.name} is to be weighed against the log: expected its inertia, and how well it is "
                 'known, such as "std": {"mass": 0.01, "com": 0.002, "inertia": 0.1}'
             )
-        covariance = _in_frame(arm, std.covariance(body.parameters), body.parameters.frame)
+        covariance = in_frame(arm, std.covariance(body.parameters), body.parameters.frame)
         drawn = KnownBody(arm.in_frame(body.parameters).phi, covariance)
     return Known.of(mass, com, if_held, drawn, families)
 
@@ -141,20 +125,6 @@ def plausible_known(known: Known | None, arm: Arm) -> Known | None:
     if known is not None and known.body is not None:
         plausible_mass(float(known.body.phi[0]), "the known body weighs", arm)
     return known
-
-
-def plausible_mass(mass: float, said: str, arm: Arm) -> None:
-    """See that an arm can hold a mass [kg]. said: what it is, as the message begins.
-
-    Raises:
-        IdentificationError: it is more than three times the rated payload.
-    """
-    most = HEAVIEST * rated_mass(arm)
-    if not abs(mass) <= most:
-        raise IdentificationError(
-            f"{said} {mass:.4g} kg: expected at most {most:.3g} kg, {HEAVIEST:g} times what {arm.name} is rated for; "
-            "give kilograms and metres"
-        )
 
 
 def _carries(arm: Arm, tool: InertialParameters, tare: Recording | None, profile: Profile | None) -> tuple[bool, bool]:

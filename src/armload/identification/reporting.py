@@ -21,13 +21,13 @@ from armload.identification.arm_notes import (
 from armload.identification.found import Found
 from armload.identification.intervals import about_com, intervals, phi_interval
 from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
+from armload.identification.mounted_tool import any_inertia
 from armload.identification.notes import COMPUTED, lacking, leaning_on_prior, less_than_nothing, not_rigid, without_mass
-from armload.inertia import HELD, Z95, InertialParameters, held, is_consistent, vech
+from armload.inertia import HELD, Z95, InertialParameters, held, is_consistent
 from armload.inertia import determined as determined_by
 from armload.posterior.restless import RESTLESS
 from armload.recording import Recording
 from armload.regression import payload_prior_std
-from armload.regression.prior import REACH
 
 _CHECK = "check the robot, the base (--gravity), what is mounted, the torques' signs, and that gravity is in them"
 NO_BODY = f"no body fits within the error bars: {_CHECK}"
@@ -58,7 +58,8 @@ def answered(
     phi = body_of(estimate, determined[0], found.exchanged)
     low, high = phi_interval(phi, estimate.phi, estimate.std, determined, before, otherwise)
     if unsure is not None:
-        low, high = _with_any_inertia(low, high, unsure)
+        below, above = any_inertia(unsure)
+        low, high = low - np.r_[np.zeros(4), below], high + np.r_[np.zeros(4), above]
     found_of = intervals(phi, low, high, estimate.covariance, otherwise)
     doubts = _doubts(found, arm, determined[0], relative_to)
     every_note = [*doubts, *notes, *([] if tared else without_mass(arm))]
@@ -188,16 +189,3 @@ def doubt_of(
     if changed is not None:
         return changed
     return not_rigid(restlessness, joint) if restlessness > RESTLESS else None
-
-
-def _with_any_inertia(
-    low: NDArray[np.float64], high: NDArray[np.float64], tool: InertialParameters
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Intervals (10,) of what a tool carries, were the tool's inertia that of any body within `REACH` of its centre.
-
-    0 to mass·REACH² about each axis, products half of that either way, in place of what was assumed.
-    """
-    most, own = tool.mass * REACH**2, vech(tool.inertia_com)
-    diagonal = np.array([True, False, False, True, False, True])
-    less, more = np.where(diagonal, most - own, most / 2.0), np.where(diagonal, own, most / 2.0)
-    return low - np.r_[np.zeros(4), less], high + np.r_[np.zeros(4), more]

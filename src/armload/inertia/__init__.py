@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         held,
         held_probability,
     )
+    from armload.inertia.inexact import Inexact
     from armload.inertia.orders import ORDERS, from_order, to_order
     from armload.inertia.parameters import (
         NAMES,
@@ -55,6 +56,7 @@ __all__ = [
     "UNITS",
     "Z95",
     "InertialParameters",
+    "Inexact",
     "com_interval",
     "com_to_phi",
     "determined",

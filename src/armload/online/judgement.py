@@ -14,7 +14,7 @@ from armload.identification.found import explained
 from armload.identification.intervals import Before
 from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
 from armload.identification.reporting import doubt_of, removal
-from armload.inertia import DROPPED, determined, held, held_probability
+from armload.inertia import DROPPED, Inexact, determined, held, held_probability
 from armload.online.doubts import Doubts
 from armload.online.thresholds import STANDS
 from armload.online.watch import PayloadWatch
@@ -38,7 +38,8 @@ class Judgement:
     """The last answer and what is said of it.
 
     Args:
-        arm: whose payload it is. prior: as of `Identifier.payload_prior`.
+        arm: whose payload it is. prior: as of `Identifier.payload_prior`. tared: whether the arm is known from
+            elsewhere, with whatever was mounted there.
 
     Attributes:
         before, around, determined, held, p_held, rests_on_prior, torque_gain_std, notes: as of `OnlineEstimate`.
@@ -47,8 +48,8 @@ class Judgement:
         doubts: what was asked of the runs besides the payload. doubted: whether that speaks against its error bars.
     """
 
-    def __init__(self, arm: Arm, prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None) -> None:
-        self._arm, self._weak = arm, payload_prior_std(arm)
+    def __init__(self, arm: Arm, prior: tuple[NDArray[np.float64], NDArray[np.float64]] | None, tared: bool) -> None:
+        self._arm, self._weak, self._tared = arm, payload_prior_std(arm), tared
         self.before = self._first = Before(*(prior or (np.zeros(10), self._weak)))
         self.doubts = Doubts(arm)
         self.reset()
@@ -57,18 +58,24 @@ class Judgement:
         """What is known beforehand."""
         mean, std = self.before = self._first
         self.estimate = Estimate(0.0, mean, np.diag(std**2), 0, str(self._arm.frame))
-        self.around, self.doubted, self.newest = mean, False, -np.inf
+        self.around, self.newest = mean, -np.inf
         self.run: Identifier | None = None
+        self.doubted = not self._tool_trusted(None)
         self.doubts.reset()
         self.determined, self.held, self.p_held = np.zeros(10, dtype=bool), False, 0.0
         self.rests_on_prior, self.torque_gain_std = np.ones(10, dtype=bool), None
         self.notes: tuple[str, ...] = ()
 
+    def allowing(self, estimate: Estimate, run: Identifier) -> Estimate:
+        """An answer of a run that allows for the error of the tool that the arm was given with."""
+        tool = self._tool_of(run)
+        return estimate if tool is None else replace(estimate, covariance=estimate.covariance + tool.covariance)
+
     def take(self, estimate: Estimate, run: Identifier | None) -> None:
         """A newer answer, of which the last judgement holds; of no run alone while samples are left out."""
         self._take(estimate, run)
         if run is not None:
-            self.doubted = bool(self.doubts.sentences)
+            self.doubted = bool(self.doubts.sentences) or not self._tool_trusted(run)
 
     def counts(self, run: PosteriorLeastSquares) -> tuple[bool, bool]:
         """Whether a sample that a run took makes `newest` newer, or says nothing new, as the arm stands."""
@@ -114,6 +121,8 @@ class Judgement:
         if is_removal(estimate, bool(self.determined[0])):
             notes.append(removal(relative_to))
         notes += self.doubts.sentences
+        if (tool := self._tool_of(run)) is not None:
+            notes += tool.notes
         denies_family = isinstance(run, HybridIdentifier) and run.denies_family
         if self.held and posterior is not None and (taken is None or denies_family):
             denied = denied_by(posterior.known, posterior.log_only, denies_family)
@@ -140,14 +149,26 @@ class Judgement:
             estimate, run, relative_to: as of `judge`.
         """
         exchanged = run.exchanged if isinstance(run, PosteriorLeastSquares) else False
-        sound = exchanged or explained(estimate, run.unprojected)
+        unprojected, tool = run.unprojected, self._tool_of(run)
+        if unprojected is not None and tool is not None:
+            unprojected = unprojected[0], unprojected[1] + tool.covariance
+        sound = exchanged or explained(estimate, unprojected)
         doubt = doubt_of(exchanged, sound, None, 0.0, relative_to=relative_to)
         self._take(estimate, run)
         self.estimate = replace(estimate, phi=body_of(estimate, bool(self.determined[0]), exchanged))
         self.newest, mass = t, (float(estimate.phi[0]), float(estimate.std[0]))
         self.held = held(*mass, bool(self.determined[0]))  # as of a log
-        self.doubted = doubt is not None or bool(self.doubts.sentences)
+        self.doubted = doubt is not None or bool(self.doubts.sentences) or not self._tool_trusted(run)
         self.notes += () if doubt is None else (doubt,)
+
+    def _tool_of(self, run: Identifier | None) -> Inexact | None:
+        """The error of the tool that a run's answer has; a tare, or the empty run before, has it, too."""
+        shared = self._tared or getattr(run, "reference", None) is not None
+        return None if shared else self._arm.attached_error
+
+    def _tool_trusted(self, run: Identifier | None) -> bool:
+        tool = self._tool_of(run)
+        return tool is None or tool.calibrated
 
     def _take(self, estimate: Estimate, run: Identifier | None) -> None:
         self.estimate, self.run, self.around = estimate, run, estimate.phi

@@ -41,7 +41,8 @@ class OnlineIdentifier:
     (False, False, 1)
 
     Args:
-        arm: the bare arm (or with a tool that is known), with the frame and gravity wanted; or as for `identify`.
+        arm: the bare arm (or with a tool that is known, `with_tool`), with the frame and gravity wanted; or as for
+            `identify`.
         tare: an earlier log of the same arm, or its path, on any motion, with whatever was mounted then: estimates are
             of what was added since.
         method: a name of the catalogue, or a trained model's file; None: the most trustworthy for the arm.
@@ -80,7 +81,7 @@ class OnlineIdentifier:
         self._every = min(max(every, PUBLISH), SELDOM)
         self.method = self.engine.name
         self._stream = Listening(arm)
-        self._judgement = Judgement(arm, first.payload_prior)
+        self._judgement = Judgement(arm, first.payload_prior, self._tared or profile is not None)
         self.reset()
 
     @property
@@ -176,6 +177,7 @@ class OnlineIdentifier:
             if all_finite(estimate.phi):
                 if self._watch is not None:
                     self._judgement.doubts.look(self._watch.run, self.relative_to)
+                estimate = self._judgement.allowing(estimate, self.engine)
                 self._judge(estimate, self.engine)
                 self._judgement.conclude(estimate, self.engine, self.relative_to, self._stream.now)
         return self._present()
@@ -246,6 +248,7 @@ class OnlineIdentifier:
             return
         self._judgement.newest = sample.t
         self._stream.forget_pauses()
+        estimate = self._judgement.allowing(estimate, self._engine)
         if not 0.0 <= sample.t - self._published < self._every:
             self._published = sample.t
             self._judge(estimate, self._engine)
@@ -273,15 +276,15 @@ class OnlineIdentifier:
         if mixed and not fresh:
             return
         judgement.doubts.look(run, self.relative_to)
+        estimate = judgement.allowing(watch.track(sample.t) if mixed else estimate, run)
         if fresh:
             self._published = sample.t
-            estimate = watch.track(sample.t) if mixed else estimate
             self._judge(estimate, run, stands)
         judgement.take(estimate, run)
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
-        self._published, estimate = sample.t, watch.track(sample.t)
+        self._published, estimate = sample.t, self._judgement.allowing(watch.track(sample.t), watch.run)
         self._judgement.take(estimate, None)
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t

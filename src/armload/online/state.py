@@ -23,7 +23,7 @@ from armload.runtime.atomic import replacing
 from armload.runtime.content import digest_of_numbers
 from armload.runtime.packing import Packer, Unpacker
 
-FORMAT = 29
+FORMAT = 30
 
 
 def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, method: str, engine: Identifier) -> Path:

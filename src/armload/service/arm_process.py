@@ -180,9 +180,9 @@ class ArmProcess:
         tool = self.settings.tool_on(bare)
         if tool is None:
             return bare
-        from armload.identification import plausible_tool
+        from armload.identification import with_tool
 
-        return bare.with_payload(plausible_tool(bare.in_frame(tool.parameters), bare))
+        return with_tool(bare, tool)
 
     def _made_feedback(self) -> Feedback:
         bare = self.settings.bare_arm()

@@ -20,7 +20,7 @@ from armload.app.cli.arguments import (
     file_name,
     output_file,
 )
-from armload.app.cli.named import arm_of, payload_of, robot_of
+from armload.app.cli.named import arm_of, payload_named, robot_of
 from armload.app.cli.named_logs import columns_for, columns_of, read_logs
 from armload.app.cli.outputs import check_output, contents_of
 from armload.app.cli.printing import notes_aside, print_note
@@ -253,9 +253,9 @@ def _arm_of(options: argparse.Namespace) -> Arm:
             "--tool and --tare together are for a log (armload identify), which finds out whether the tool was mounted "
             "at the tare: on a live robot give one of them; with a tare, the answer is what was added since"
         )
-    from armload.identification import plausible_tool
+    from armload.identification import with_tool
 
-    return arm.with_payload(plausible_tool(arm.in_frame(payload_of(options.tool, arm)), arm))
+    return with_tool(arm, payload_named(options.tool, arm))
 
 
 def _learn(session, path: str) -> None:
