@@ -364,14 +364,20 @@ def test_a_known_weight_below_a_known_tool_weighs_as_much_as_both(folder, profil
     (log,) = simulate_many(panda, [run], rate=100.0, duration=6.0, workers=1, resolution=COARSE)
     write_recording(folder / "hung.csv", log)
     both, gains = hand.mass + 2.0, []
-    for mass, more in ((2.0, ["--tool", "franka-hand"]), (both, [])):
-        path = tmp_path / f"{mass}.profile"
+    about = {"mass": hand.mass, "com": hand.com.tolist(), "inertia_com": hand.inertia_com.tolist(), "frame": hand.frame}
+    (tmp_path / "hand.json").write_text(json.dumps({**about, "std": {"mass": 0.05}}))
+    named, weighed = ["--tool", "franka-hand"], ["--tool", str(tmp_path / "hand.json")]
+    cases = ((2.0, 0.002, named), (both, 0.002, []), (2.0, 0.002, weighed), (both, np.hypot(0.002, 0.05), []))
+    for k, (mass, std, more) in enumerate(cases):
+        path = tmp_path / f"{k}.profile"
         path.write_bytes(profile.read_bytes())
         words = ["profile", str(folder / "hung.csv"), "--robot", "panda", "--out", str(path), "--update"]
-        assert main([*words, "--mass", f"{mass}±0.002", *more]) == 0
+        assert main([*words, "--mass", f"{mass}±{std}", *more]) == 0
         gains.append(load_profile(path).gain)
     np.testing.assert_allclose(gains[0], gains[1], rtol=1e-12)
+    np.testing.assert_allclose(gains[2], gains[3], rtol=0, atol=1e-9)
     assert np.abs(gains[0]).max() < 0.03
+    assert np.abs(gains[2] - gains[0]).max() > 1e-4  # a tool that is not known so well tells less
 
 
 def test_a_profile_that_another_program_changed_meanwhile_is_left_so(folder, profile, tmp_path, monkeypatch, capsys):

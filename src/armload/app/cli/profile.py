@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from armload.app.cli.arguments import (
     weighed,
 )
 from armload.app.cli.idle import given, refuse_idle
-from armload.app.cli.named import arm_of, payload_of
+from armload.app.cli.named import arm_of, payload_named
 from armload.app.cli.named_logs import read_logs
 from armload.app.cli.outputs import check_unchanged, contents_of
 from armload.app.cli.printing import print_json, print_note, working
@@ -24,6 +25,10 @@ from armload.app.cli.profile_text import fields_of, in_time, of_motors, print_pr
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from armload.arms import Arm
     from armload.posterior import Profile
 
 _USAGE = """armload profile LOG… --robot R --out P [--update] …
@@ -102,7 +107,7 @@ def run(options: argparse.Namespace) -> None:
         known = load_profile(options.out) if options.update else None
         if known is not None:
             _check_frame(known, arm, options.frame)
-        tool = None if options.tool is None else arm.in_frame(payload_of(options.tool, arm)).phi
+        tool, off = (None, 0.0) if options.tool is None else _tool(options.tool, arm)
         read = [read_logs(options, arm, path)[0] for path in options.logs]
         logs = [log for log in read if log is not None]
         for log in logs:
@@ -110,7 +115,8 @@ def run(options: argparse.Namespace) -> None:
         say("learning")
         if known is not None and options.mass is not None:
             mass, std = options.mass
-            profile = with_known_weight(known, arm, logs[0], mass if tool is None else mass + float(tool[0]), std)
+            mass += 0.0 if tool is None else float(tool[0])
+            profile = with_known_weight(known, arm, logs[0], mass, math.hypot(std, off))
         else:
             if known is not None:
                 check_new(logs, known)
@@ -139,6 +145,16 @@ def run(options: argparse.Namespace) -> None:
         same += f" --gravity {','.join(f'{x:g}' for x in options.gravity)}"
     use = f"armload identify LOG --robot {options.robot}{same} --profile {options.out}"
     print(f"wrote {options.out} ({size:.1f} MB); use it with: {use}")
+
+
+def _tool(name: str, arm: Arm) -> tuple[NDArray[np.float64], float]:
+    """A tool's parameters (10,) about the arm's frame, and the standard deviation of its mass [kg]."""
+    from armload.payloads import INERTIA_ASSUMED
+
+    tool = payload_named(name, arm)
+    if not tool.inertia_known:
+        print_note(f"{name}: {INERTIA_ASSUMED}")
+    return arm.in_frame(tool.parameters).phi, math.sqrt(tool.covariance[0, 0])
 
 
 def _check_frame(known: Profile, arm: Any, frame: str | None) -> None:
