@@ -8,7 +8,7 @@ import pytest
 
 from armload.arms import arm, payload_regressor
 from armload.errors import IdentificationError
-from armload.identification import identify, with_tool
+from armload.identification import identify, known_of, with_tool
 from armload.identification.tare_age import DAY
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, taie2024
@@ -63,10 +63,12 @@ def case(kind, panda_logs, same_motion):
     if kind == "gaps":
         run = with_a_gap(run)
     wants_tare = kind in ("tare", "old tare", "same motion", "motor torque")
-    return robot, run, tare if wants_tare else None, {"tool": TOOL, "weighed tool": WEIGHED}.get(kind)
+    tools = {"tool": TOOL, "weighed tool": WEIGHED, "weighed tool and payload": WEIGHED}
+    return robot, run, tare if wants_tare else None, tools.get(kind)
 
 
-KINDS = ("untared", "tare", "old tare", "same motion", "tool", "weighed tool", "30 Hz", "gaps", "motor torque")
+KINDS = ("untared", "tare", "old tare", "same motion", "tool", "30 Hz", "gaps", "motor torque")
+KINDS += ("weighed tool", "weighed tool and payload")
 CASES = [(kind, None) for kind in KINDS]
 CASES += [pytest.param(kind, "map-gp", marks=() if kind == "untared" else pytest.mark.full) for kind in KINDS]
 
@@ -75,9 +77,11 @@ CASES += [pytest.param(kind, "map-gp", marks=() if kind == "untared" else pytest
 def test_identify_says_what_the_concluded_stream_says(kind, method, panda_logs, same_motion):
     robot, run, tare, tool = case(kind, panda_logs, same_motion)
     age = 9 * DAY if kind == "old tare" else 0.0
-    answer = identify(run, robot, tare=tare, tool=tool, method=method, tare_age=age)
+    mass = (make_payload().parameters.mass - TOOL.mass, 0.002) if kind == "weighed tool and payload" else None
+    known = None if mass is None else known_of(robot, mass, None, if_held=True)
+    answer = identify(run, robot, tare=tare, tool=tool, method=method, tare_age=age, mass=mass)
     carrying = robot if tool is None else with_tool(robot, tool)
-    stream = OnlineIdentifier(carrying, tare, method, tare_age=age)
+    stream = OnlineIdentifier(carrying, tare, method, known=known, tare_age=age)
     for sample in run:
         stream.update(*sample)
     end = stream.conclude()

@@ -11,12 +11,27 @@ import pytest
 from armload import arm, identify
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters, vech
-from armload.payloads import franka_hand, read_payload
+from armload.motion import random_motion
+from armload.payloads import Payload, franka_hand, read_payload
+from armload.payloads import test_payload as make_payload
 from armload.payloads.payload_file import write_payload
 from armload.payloads.uncertainty import Uncertainty
+from armload.simulation import World, simulate
 
 MASS, COM = 0.7, np.array([0.01, -0.03, 0.06])
 INERTIA = np.array([[2e-3, 1e-4, 0.0], [1e-4, 1.5e-3, -2e-4], [0.0, -2e-4, 1e-3]])
+
+
+@pytest.fixture(scope="module")
+def simulated_run():
+    """A Panda, its log with a payload below a gripper, what is said of the gripper (80 g too little), the payload."""
+    robot = arm("panda")
+    inertia = np.diag([1e-3, 1e-3, 5e-4])
+    gripper, stated = (InertialParameters.from_com(mass, (0.0, 0.01, 0.05), inertia) for mass in (0.5, 0.42))
+    truth = make_payload().parameters
+    motion = random_motion(robot, seed=53, duration=6.0)
+    both = InertialParameters(truth.phi + gripper.phi, robot.frame)
+    return robot, simulate(robot, motion, both, world=World.real_like(robot, seed=3), rate=100.0, seed=3), stated, truth
 
 
 def test_the_covariance_is_that_of_many_tools_drawn_as_uncertain():
@@ -141,3 +156,28 @@ def test_a_covariance_that_is_none_is_refused_and_what_std_says_is_believed(tmp_
     saved_answer(file, phi, drawn_covariance(phi), "panda_link8")
     file.write_text(json.dumps(json.loads(file.read_text()) | {"std": {"mass": 0.02}}))
     assert np.sqrt(read_payload(file).covariance[0, 0]) == pytest.approx(0.02)
+
+
+def test_a_weighed_payload_tells_what_its_tool_weighs_and_not_the_other_way_round(simulated_run):
+    """phi of the payload alone given its mass: the Gaussian of log and tool together, conditioned on one coordinate."""
+    robot, run, stated, truth = simulated_run
+    mass, std = truth.mass, 0.002
+    off = Payload("gripper", stated, uncertainty=Uncertainty(0.08, 0.002, 0.1))
+    loose = identify(run, robot, tool=off, method="map-gp")
+    known = identify(run, robot, tool=off, method="map-gp", mass=(mass, std))
+    C = np.asarray(loose.covariance)
+    gain = C[:, 0] / (C[0, 0] + std**2)
+    unit = np.sqrt(np.diag(C))
+    np.testing.assert_allclose((known.covariance - C + np.outer(gain, C[0])) / np.outer(unit, unit), 0.0, atol=1e-2)
+    np.testing.assert_allclose((known.phi - loose.phi - gain * (mass - loose.phi[0])) / unit, 0.0, atol=1e-3)
+    assert not any("is not what the log says" in note for note in known.notes)
+
+
+@pytest.mark.parametrize("method", ["hybrid", "map-gp"])
+def test_a_weighed_payload_is_as_heavy_as_it_was_weighed_below_a_tool_that_is_not(simulated_run, method):
+    robot, run, stated, truth = simulated_run
+    off = Payload("gripper", stated, uncertainty=Uncertainty(0.08, 0.002, 0.1))
+    known = identify(run, robot, tool=off, method=method, mass=(truth.mass, 0.002))
+    assert known.mass == pytest.approx(truth.mass, abs=0.002)
+    assert known.phi_high[0] - known.phi_low[0] < 0.009
+    assert np.all((known.phi_low <= truth.phi) & (truth.phi <= known.phi_high))

@@ -17,6 +17,7 @@ from armload.identification.choice import Choice, choose
 from armload.identification.intervals import Before
 from armload.identification.known_payload import know
 from armload.identification.last_equations import LastEquations
+from armload.identification.mounted_tool import allowing_for
 from armload.identification.own_scale import OwnScale, own_scale
 from armload.identification.shown_friction import driven_joints, is_frictionless
 from armload.identification.thresholds import LARGEST_OFFSET, MISFIT, MOVES
@@ -124,8 +125,9 @@ class Found(NamedTuple):
 
     def with_error(self, error: Inexact) -> Found:
         """The same with one more error of phi: of a tool that is not known exactly."""
+        known = None if self.exchanged else self.known
+        estimate = allowing_for(error, self.estimate, known, self.log_only)
         unprojected, log_only = (x and (x[0], x[1] + error.covariance) for x in (self.unprojected, self.log_only))
-        estimate = replace(self.estimate, covariance=self.estimate.covariance + error.covariance)
         calibrated = error.calibrated and self.calibrated
         return self._replace(estimate=estimate, unprojected=unprojected, log_only=log_only, calibrated=calibrated)
 

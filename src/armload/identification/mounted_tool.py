@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, rated_mass
 from armload.errors import IdentificationError
+from armload.estimators import Estimate
 from armload.identification.thresholds import HEAVIEST
-from armload.inertia import Z95, InertialParameters, Inexact, vech
+from armload.inertia import Z95, InertialParameters, Inexact, near_consistent, nearest_body, vech
 from armload.payloads import INERTIA_ASSUMED, Payload
+from armload.posterior import Known
+from armload.posterior.known import Gaussian
 from armload.regression.prior import REACH
 
 
@@ -65,6 +70,26 @@ def with_tool(arm: Arm, tool: InertialParameters | Payload) -> Arm:
         std = np.maximum(*any_inertia(known)) / Z95
         error += Inexact(np.diag(np.r_[np.zeros(4), std**2]))
     return arm.with_payload(known, error)
+
+
+def allowing_for(
+    error: Inexact, estimate: Estimate, known: Known | None, log_only: Gaussian | None, quick: bool = False
+) -> Estimate:
+    """An answer that allows for the error of a tool, which has nothing to do with the log.
+
+    What is known of the payload is held against the log with that error: a weighed payload leaves what the tool weighs
+    in doubt, and not the other way round.
+
+    Args:
+        known: of the payload, apart from the log. log_only: what the log says without it. quick: the nearest body is
+            found in bounded time.
+    """
+    if known is None or log_only is None or not known.which.any():
+        return replace(estimate, covariance=estimate.covariance + error.covariance)
+    alone = log_only[0], log_only[1] + error.covariance
+    mean, covariance = known.given(*alone) or alone
+    body = near_consistent(mean, np.linalg.inv(covariance)) if quick else nearest_body(mean, covariance)
+    return replace(estimate, phi=body, covariance=covariance)
 
 
 def any_inertia(tool: InertialParameters) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

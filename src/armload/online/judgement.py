@@ -13,12 +13,14 @@ from armload.identification.answer import body_of, is_removal
 from armload.identification.found import explained
 from armload.identification.intervals import Before
 from armload.identification.known_payload import denied_by, determined_with, rests_on_prior
+from armload.identification.mounted_tool import allowing_for
 from armload.identification.reporting import doubt_of, removal
 from armload.inertia import DROPPED, Inexact, determined, held, held_probability
 from armload.online.doubts import Doubts
 from armload.online.thresholds import STANDS
 from armload.online.watch import PayloadWatch
 from armload.posterior import HybridIdentifier, PosteriorLeastSquares
+from armload.posterior.known import Gaussian
 from armload.regression import payload_prior_std
 
 _STANDING = "standing: nothing new is learned until the arm moves, or what it holds changes"
@@ -66,10 +68,16 @@ class Judgement:
         self.rests_on_prior, self.torque_gain_std = np.ones(10, dtype=bool), None
         self.notes: tuple[str, ...] = ()
 
-    def allowing(self, estimate: Estimate, run: Identifier) -> Estimate:
-        """An answer of a run that allows for the error of the tool that the arm was given with."""
-        tool = self._tool_of(run)
-        return estimate if tool is None else replace(estimate, covariance=estimate.covariance + tool.covariance)
+    def allowing(self, estimate: Estimate, run: Identifier, mixed: bool = False, concluded: bool = False) -> Estimate:
+        """An answer of a run that allows for the error of the tool that the arm was given with.
+
+        mixed: whether it is of other runs, too.
+        """
+        if (tool := self._tool_of(run)) is None:
+            return estimate
+        posterior = run if isinstance(run, PosteriorLeastSquares) and not (mixed or run.exchanged) else None
+        known, log_only = (None, None) if posterior is None else (posterior.known, posterior.log_only)
+        return allowing_for(tool, estimate, known, log_only, quick=not concluded)
 
     def take(self, estimate: Estimate, run: Identifier | None) -> None:
         """A newer answer, of which the last judgement holds; of no run alone while samples are left out."""
@@ -125,7 +133,7 @@ class Judgement:
             notes += tool.notes
         denies_family = isinstance(run, HybridIdentifier) and run.denies_family
         if self.held and posterior is not None and (taken is None or denies_family):
-            denied = denied_by(posterior.known, posterior.log_only, denies_family)
+            denied = denied_by(posterior.known, self._with_tool_s_error(posterior.log_only, run), denies_family)
             notes += [] if denied is None else [denied]
         self.notes = tuple(notes)
 
@@ -149,10 +157,7 @@ class Judgement:
             estimate, run, relative_to: as of `judge`.
         """
         exchanged = run.exchanged if isinstance(run, PosteriorLeastSquares) else False
-        unprojected, tool = run.unprojected, self._tool_of(run)
-        if unprojected is not None and tool is not None:
-            unprojected = unprojected[0], unprojected[1] + tool.covariance
-        sound = exchanged or explained(estimate, unprojected)
+        sound = exchanged or explained(estimate, self._with_tool_s_error(run.unprojected, run))
         doubt = doubt_of(exchanged, sound, None, 0.0, relative_to=relative_to)
         self._take(estimate, run)
         self.estimate = replace(estimate, phi=body_of(estimate, bool(self.determined[0]), exchanged))
@@ -165,6 +170,10 @@ class Judgement:
         """The error of the tool that a run's answer has; a tare, or the empty run before, has it, too."""
         shared = self._tared or getattr(run, "reference", None) is not None
         return None if shared else self._arm.attached_error
+
+    def _with_tool_s_error(self, said: Gaussian | None, run: Identifier | None) -> Gaussian | None:
+        tool = self._tool_of(run)
+        return said if said is None or tool is None else (said[0], said[1] + tool.covariance)
 
     def _tool_trusted(self, run: Identifier | None) -> bool:
         tool = self._tool_of(run)

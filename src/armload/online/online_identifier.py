@@ -177,7 +177,7 @@ class OnlineIdentifier:
             if all_finite(estimate.phi):
                 if self._watch is not None:
                     self._judgement.doubts.look(self._watch.run, self.relative_to)
-                estimate = self._judgement.allowing(estimate, self.engine)
+                estimate = self._judgement.allowing(estimate, self.engine, concluded=True)
                 self._judge(estimate, self.engine)
                 self._judgement.conclude(estimate, self.engine, self.relative_to, self._stream.now)
         return self._present()
@@ -276,7 +276,7 @@ class OnlineIdentifier:
         if mixed and not fresh:
             return
         judgement.doubts.look(run, self.relative_to)
-        estimate = judgement.allowing(watch.track(sample.t) if mixed else estimate, run)
+        estimate = judgement.allowing(watch.track(sample.t) if mixed else estimate, run, mixed)
         if fresh:
             self._published = sample.t
             self._judge(estimate, run, stands)
@@ -284,7 +284,7 @@ class OnlineIdentifier:
 
     def _track(self, watch: PayloadWatch, sample: Sample) -> None:
         """While samples are left out: what all that may have happened makes of the payload."""
-        self._published, estimate = sample.t, self._judgement.allowing(watch.track(sample.t), watch.run)
+        self._published, estimate = sample.t, self._judgement.allowing(watch.track(sample.t), watch.run, True)
         self._judgement.take(estimate, None)
         if watch.settling or watch.likely[0] > 0.5:  # then phi follows what the samples say
             self._judgement.newest = sample.t
