@@ -12,6 +12,7 @@ from armload.recording import ColumnSpec
 from armload.service import ArmSettings, ServiceSettings, read_settings
 from armload.service.access import read_token
 
+OF_THE_SERVICE = ({f.name for f in dataclasses.fields(ServiceSettings)} | {"token_file"}) - {"arms", "token"}
 CELL = """
 every = 0.5
 port = 0
@@ -153,6 +154,29 @@ def test_a_state_belongs_to_the_settings_it_was_made_with(of, tmp_path):
     assert ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=2.0).state == (
         ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=3.0).state
     )
+
+
+def test_a_state_goes_on_where_a_version_knows_more_settings_and_they_are_not_given():
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class Later(ArmSettings):
+        colour: str = "none"
+
+    now = ArmSettings("panda", name="left", source="sim", save="kept")
+    assert now.state.name == "left-e55ab740.npz"  # as the versions before have written it
+    for given in ({"steady": True}, {"mass": "1.2±0.1"}, {"family": "wide"}, {"tare": "e.csv", "tare_age": 0.0}):
+        state = ArmSettings("panda", name="left", source="sim", save="kept", **given).state
+        assert state != now.state
+        assert Later("panda", name="left", source="sim", save="kept", **given).state == state
+    assert Later("panda", name="left", source="sim", save="kept").state == now.state
+    assert Later("panda", name="left", source="sim", save="kept", colour="red").state != now.state
+
+
+@pytest.mark.parametrize("key", sorted(OF_THE_SERVICE))
+def test_a_setting_of_the_service_below_an_arm_is_told_where_it_belongs(key, tmp_path):
+    (tmp_path / "cell.toml").write_text(f'[[arm]]\nname = "left"\nsource = "sim"\nrobot = "panda"\n{key} = 1\n')
+    says = "unknown setting" if key == "duration" else f"{key} is of the service"  # --duration is no setting of a file
+    with pytest.raises(UsageError, match=says):
+        read_settings(tmp_path / "cell.toml")
 
 
 def test_a_state_belongs_to_the_folder_of_its_tare_as_it_was(tmp_path):
