@@ -11,6 +11,8 @@ from armload.errors import RecordingError, UsageError
 from armload.recording import ColumnSpec
 from armload.service import ArmSettings, ServiceSettings, read_settings
 from armload.service.access import read_token
+from armload.service.alarms import _CONDITIONS
+from armload.service.unknown import Unknown
 
 OF_THE_SERVICE = ({f.name for f in dataclasses.fields(ServiceSettings)} | {"token_file"}) - {"arms", "token"}
 CELL = """
@@ -138,6 +140,18 @@ def test_what_cannot_be_meant_is_one_sentence(tmp_path, capsys, change, said):
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1
+
+
+def rows_of(head):
+    """The first cells, in their order, of the table of docs/service.md whose first heading is `head`."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "service.md").read_text(encoding="utf-8")
+    below = page.split(f"| `{head}` | when |\n")[1].split("\n\n")[0].splitlines()
+    return [row.split("`")[1] for row in below if row.startswith("| `")]
+
+
+def test_the_page_has_a_row_for_every_reason_in_the_order_they_are_given_and_for_every_alarm():
+    assert rows_of("unknown") == [reason.value for reason in Unknown]
+    assert rows_of("alarm") == list(_CONDITIONS)
 
 
 @pytest.mark.parametrize("of", ["tare", "body"])
