@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from armload.arms import arm
-from armload.devices import Detached, Recorded, Recorder, Replay, Ring, RingReader, Simulator, open_source
+from armload.devices import Detached, Recorded, Recorder, Replay, Ring, RingReader, Simulator, open_mover, open_source
 from armload.devices.order import (
     arm_from_json,
     arm_to_json,
@@ -764,7 +764,10 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
     [
         ("http://robot", "unknown kind of source 'http'"),
         ("fr3://", "names no robot"),
-        ("ur://", "names no robot"),
+        ("ur://", "names no robot: expected ur://ADDRESS, such as ur://172.16.0.2"),
+        ("ros2://", "names no topic: expected ros2://TOPIC, such as ros2:///joint_states"),
+        ("ros2:///", "names no topic"),
+        ("ROS2://?compensated=nothing", "names no topic: expected ros2://TOPIC"),
         ("ur://127.0.0.1?torque_constant=1,2,3,4,5,6", "unknown option 'torque_constant'"),
         ("ur://127.0.0.1?compensated=nothing", r"unknown option 'compensated': .* \?torque_constants=…$"),
         ("ros2:///joint_states?steady=1", r"unknown option 'steady': .*\?torque_constants=… or \?compensated=… or"),
@@ -785,6 +788,14 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
 def test_a_source_that_cannot_be_opened_says_why(panda, spec, text):
     with pytest.raises(ArmloadError, match=text):
         open_source(spec, panda, detached=False)
+
+
+@pytest.mark.parametrize("spec", ["run.csv", "kuka://172.16.0.2"])
+def test_what_cannot_be_moved_is_told_how_each_arm_that_can_is_written(panda, spec):
+    with pytest.raises(
+        ArmloadError, match=r"expected sim, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS, ros2://TOPIC$"
+    ):
+        open_mover(spec, panda)
 
 
 @pytest.mark.parametrize("spec", ["ros2:///arm/joint_states", "ros2://arm/joint_states"])
