@@ -9,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from armload.devices.order import (
     payloads_from_json,
     payloads_to_json,
 )
+from armload.devices.pace import Pace
 from armload.devices.recorder import next_free
 from armload.errors import ArmloadError, MotionError, PayloadError, RecordingError, SourceError
 from armload.inertia import InertialParameters
@@ -788,6 +790,17 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
 def test_a_source_that_cannot_be_opened_says_why(panda, spec, text):
     with pytest.raises(ArmloadError, match=text):
         open_source(spec, panda, detached=False)
+
+
+def test_the_first_sample_is_due_at_once_whatever_its_time_and_others_are_as_much_later():
+    pace = Pace(2.0)
+    pace.stop()  # then nobody waits, and it says all the same when samples would be due
+    before = time.monotonic()
+    pace.wait(1.7e9)
+    first = pace.due
+    assert before <= first <= time.monotonic()
+    pace.wait(1.7e9 + 5.0)
+    assert pace.due - first == pytest.approx(2.5)
 
 
 @pytest.mark.parametrize("spec", ["run.csv", "kuka://172.16.0.2"])
