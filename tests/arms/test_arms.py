@@ -798,7 +798,7 @@ def test_a_built_in_arm_that_is_written_otherwise_is_asked_about(name, meant):
     [
         (
             lambda: arm("pandas"),
-            r"unknown robot 'pandas': expected one of fr3, gen3, iiwa14, iiwa7, panda, ur10, .*ur5e, xarm7",
+            r"unknown robot 'pandas': expected one of fr3, gen3, .*panda, .*ur5e, .*xarm7",
         ),
         (lambda: arm("panda", frame="tool0"), r"unknown frame 'tool0' in panda: expected one of .*panda_link8$"),
         (lambda: arm("ur10e", frame="wrist_3"), r"unknown frame 'wrist_3'.*; did you mean 'wrist_3_link'\?"),

@@ -11,7 +11,7 @@ import armload
 from armload.app.cli.arguments import built_in_arms
 from armload.arms import ARMS, PAYLOAD_REACH, Arm, arm, facts_of, rated_effort, rated_mass, strength
 from armload.arms.facts import description_of, read_sheet
-from armload.devices import Simulator, open_source
+from armload.devices import FORMS, Simulator, open_source
 from armload.devices.opening import SCHEMES
 from armload.errors import ArmError
 from armload.identification import identify
@@ -62,6 +62,7 @@ def test_a_sheet_and_its_description_are_of_one_arm(name):
     assert (facts.name, facts.joints, facts.flange) == (name, robot.n, robot.frame)
     assert facts.flange.endswith(facts.flange_ending)
     assert facts.scheme is None or facts.scheme in SCHEMES
+    assert facts.controller is None or facts.controller in {form.maker for form in FORMS.values()}
     assert f'name="{facts.flange}"' in description_of(name)
     assert facts_of(robot) is facts
     assert excitation(robot).n == robot.n

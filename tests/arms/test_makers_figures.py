@@ -94,6 +94,13 @@ SEVEN_DH = {
 }
 
 
+FRANKAS = {"panda", "fr3"}  # whose flange is held against the maker's in test_arms.py
+
+
+def test_every_arm_is_held_against_its_makers_figures():
+    assert set(ARMS) == FRANKAS | {*UR_DH} | {*SEVEN_DH}
+
+
 def dh_frames(base, q, d, a, twist):
     """The Denavit–Hartenberg frames 1 to n (n, 4, 4) in the base: Rz(q)·Tz(d)·Tx(a)·Rx(twist) each."""
     T, frames = base, []
@@ -157,9 +164,11 @@ def test_the_moving_links_weigh_what_the_whole_arm_does_less_a_base(name):
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_the_page_of_the_arms_says_what_their_sheets_say(name):
+def test_the_page_of_the_arms_says_what_their_sheets_say_and_the_readme_names_them(name):
     facts, robot = ARMS[name], arm(name)
-    page = (Path(__file__).resolve().parents[2] / "docs" / "arms.md").read_text(encoding="utf-8")
+    root = Path(__file__).resolve().parents[2]
+    page = (root / "docs" / "arms.md").read_text(encoding="utf-8")
+    assert f"`{name}`" in (root / "README.md").read_text(encoding="utf-8")
     row = [
         f"`{name}`",
         None,

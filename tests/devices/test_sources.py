@@ -9,13 +9,14 @@ import subprocess
 import sys
 import textwrap
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from armload.arms import arm
-from armload.devices import Detached, Recorded, Recorder, Replay, Ring, RingReader, Simulator, open_source
+from armload.devices import Detached, Recorded, Recorder, Replay, Ring, RingReader, Simulator, open_mover, open_source
 from armload.devices.order import (
     arm_from_json,
     arm_to_json,
@@ -24,6 +25,7 @@ from armload.devices.order import (
     payloads_from_json,
     payloads_to_json,
 )
+from armload.devices.pace import Pace
 from armload.devices.recorder import next_free
 from armload.errors import ArmloadError, MotionError, PayloadError, RecordingError, SourceError
 from armload.inertia import InertialParameters
@@ -764,7 +766,10 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
     [
         ("http://robot", "unknown kind of source 'http'"),
         ("fr3://", "names no robot"),
-        ("ur://", "names no robot"),
+        ("ur://", "names no robot: expected ur://ADDRESS, such as ur://172.16.0.2"),
+        ("ros2://", "names no topic: expected ros2://TOPIC, such as ros2:///joint_states"),
+        ("ros2:///", "names no topic"),
+        ("ROS2://?compensated=nothing", "names no topic: expected ros2://TOPIC"),
         ("ur://127.0.0.1?torque_constant=1,2,3,4,5,6", "unknown option 'torque_constant'"),
         ("ur://127.0.0.1?compensated=nothing", r"unknown option 'compensated': .* \?torque_constants=…$"),
         ("ros2:///joint_states?steady=1", r"unknown option 'steady': .*\?torque_constants=… or \?compensated=… or"),
@@ -785,6 +790,25 @@ def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):
 def test_a_source_that_cannot_be_opened_says_why(panda, spec, text):
     with pytest.raises(ArmloadError, match=text):
         open_source(spec, panda, detached=False)
+
+
+def test_the_first_sample_is_due_at_once_whatever_its_time_and_others_are_as_much_later():
+    pace = Pace(2.0)
+    pace.stop()  # then nobody waits, and it says all the same when samples would be due
+    before = time.monotonic()
+    pace.wait(1.7e9)
+    first = pace.due
+    assert before <= first <= time.monotonic()
+    pace.wait(1.7e9 + 5.0)
+    assert pace.due - first == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("spec", ["run.csv", "kuka://172.16.0.2"])
+def test_what_cannot_be_moved_is_told_how_each_arm_that_can_is_written(panda, spec):
+    with pytest.raises(
+        ArmloadError, match=r"expected sim, fr3://ADDRESS, panda://ADDRESS, ur://ADDRESS, ros2://TOPIC$"
+    ):
+        open_mover(spec, panda)
 
 
 @pytest.mark.parametrize("spec", ["ros2:///arm/joint_states", "ros2://arm/joint_states"])

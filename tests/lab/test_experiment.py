@@ -81,6 +81,7 @@ def test_a_run_that_is_out_of_time_says_where_it_stopped(tmp_path):
     cells = run_tasks(tasks(tmp_path, 3), tmp_path / "cells", until=-1.0, say=messages.append, part="cell")
     assert messages == ["stopped before cell 2 of 3: run it again to go on"]
     assert list(cells) == ["of-0"]
+    assert list(run_tasks(tasks(tmp_path, 3), tmp_path / "cells", until=3600.0)) == ["of-0", "of-1", "of-2"]
 
 
 class Looked(dict):

@@ -1,5 +1,7 @@
 """Capsules against brute force, poses against Pinocchio, and checks against motions made to break one thing."""
 
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -211,6 +213,17 @@ def test_hitting_the_floor_or_itself_is_a_problem_with_place_and_time(panda):
 def test_a_motion_of_another_arm_is_refused():
     with pytest.raises(MotionError, match="7 joints: ur10e has 6"):
         check_motion(arm("ur10e"), taie2024())
+
+
+def test_the_table_has_the_share_of_each_limit_but_of_a_position_which_has_two(panda):
+    check = check_motion(panda, taie2024())
+    rows = {line.split()[0]: line for line in str(check).splitlines() if line.startswith("panda_joint")}
+    for k, joint in enumerate(panda.joint_names):
+        found = re.findall(r"(-?[\d.]+)(?: \((\d+) %\))?", rows[joint].removeprefix(joint))
+        names = ("position", "velocity", "acceleration", "jerk", "torque")
+        for name, (margin, share) in zip(names, found, strict=True):
+            assert float(margin) == pytest.approx(check.margin[name][k], abs=0.005)
+            assert share == ("" if name == "position" else f"{100 * check.used(name)[k]:.0f}")
 
 
 def test_an_arm_without_acceleration_limits_shows_none():

@@ -16,6 +16,7 @@ import pytest
 
 from armload.arms import arm
 from armload.devices import Counted, Detached, Load, check_writable, controller_of
+from armload.devices.opening import check_spec
 from armload.errors import SentError, SinkError, SourceError, UsageError
 from armload.inertia import InertialParameters, is_consistent
 from armload.motion import FourierMotion, save_motion, taie2024
@@ -251,6 +252,16 @@ def test_only_a_robot_s_source_can_be_told():
         controller_of("sim", arm("panda"), lambda: None)
     with pytest.raises(UsageError, match=r"left: no load can be written to run\.csv"):
         ArmSettings("panda", name="left", source="run.csv", apply="auto")
+
+
+@pytest.mark.parametrize(("source", "robot"), [("ur://127.0.0.1", "ur10e"), ("fr3://127.0.0.1", "fr3")])
+def test_a_robot_that_can_be_read_can_be_told_however_its_address_is_written(source, robot):
+    scheme, address = source.split("://")
+    for spec in (source, f"{scheme.upper()}://{address}", f"{scheme.capitalize()}://{address}"):
+        check_spec(spec)
+        assert ArmSettings(robot, name="left", source=spec, apply="auto").source == spec
+        same = controller_of(source, arm(robot), lambda: None)
+        assert type(controller_of(spec, arm(robot), lambda: None)) is type(same)
 
 
 # ---------------------------------------------------------------------- loopback robots and the makers' clients

@@ -216,6 +216,24 @@ def test_the_reasons_are_told_in_their_order(panda, analytic_log):
     assert reason(estimate, again) is Unknown.UNCONFIRMED
     assert reason(estimate, again._replace(resumed=98.0)) is None
     assert reason(estimate.behind(0.4), again._replace(resumed=99.7)) is Unknown.UNCONFIRMED
+    # a robot that was never reached is lost, not starting; one whose first connection is being made is starting
+    assert reason(None, well._replace(state="lost")) is Unknown.SOURCE_LOST
+    assert reason(None, well._replace(state="connecting")) is Unknown.STARTING
+    assert reason(None, well, compiling="compiles") is Unknown.COMPILING
+    # all at once, and then without the first of them
+    touched = first.of({**vars(first), "p_contact": 1.0})
+    changing = touched.of({**vars(touched), "settling": True})
+    bad = {"trouble": "bad", "doubt": "sign", "compiling": "compiles"}
+    assert reason(changing.behind(0.7), again._replace(state="lost"), 101.0, **bad) is Unknown.SOURCE_LOST
+    assert reason(changing.behind(0.7), again, 101.0, **bad) is Unknown.COMPILING
+    del bad["compiling"]
+    assert reason(changing.behind(0.7), again, 101.0, **bad) is Unknown.SILENT
+    assert reason(changing.behind(0.7), again, **bad) is Unknown.BEHIND
+    assert reason(changing, again, **bad) is Unknown.UNUSABLE
+    assert reason(changing, again, doubt="sign") is Unknown.IMPLAUSIBLE
+    assert reason(changing, again) is Unknown.UNCONFIRMED
+    assert reason(changing, well) is Unknown.CHANGING
+    assert reason(touched, well) is Unknown.CONTACT
 
 
 def test_a_session_goes_on_where_it_was_after_its_reader_was_killed(panda, source):

@@ -183,6 +183,21 @@ def test_an_arm_whose_velocities_are_told_by_its_positions_too_is_answered_75_ms
     assert 0.07 < min(lags) < 0.15  # the others may have waited for a busy machine
 
 
+def fields_on(page, heading):
+    """The names in the first table below a heading of a page of docs/."""
+    below = (Path(__file__).resolve().parents[2] / "docs" / page).read_text(encoding="utf-8").split(heading)[1]
+    table = re.search(r"(?:^\|.*\n)+", below, re.MULTILINE)[0]
+    rows = [row.split("|")[1] for row in table.splitlines()]
+    return {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+
+
+@pytest.mark.full
+def test_the_pages_have_a_row_for_every_field_of_a_line(serve, cell):
+    line = serve(cell("light")).until(known("light"))
+    told = fields_on("service.md", "## Output lines") | fields_on("live.md", "## Lines of JSON") - {"truth"}
+    assert set(line) == told
+
+
 @pytest.mark.full
 def test_two_arms_answer_over_http_and_a_kill_of_one_leaves_the_other(serve, cell):
     running = serve(cell("light", "heavy", port=0, every=0.2))

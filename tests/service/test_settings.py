@@ -11,7 +11,10 @@ from armload.errors import RecordingError, UsageError
 from armload.recording import ColumnSpec
 from armload.service import ArmSettings, ServiceSettings, read_settings
 from armload.service.access import read_token
+from armload.service.alarms import _CONDITIONS
+from armload.service.unknown import Unknown
 
+OF_THE_SERVICE = ({f.name for f in dataclasses.fields(ServiceSettings)} | {"token_file"}) - {"arms", "token"}
 CELL = """
 every = 0.5
 port = 0
@@ -139,6 +142,18 @@ def test_what_cannot_be_meant_is_one_sentence(tmp_path, capsys, change, said):
     assert err.count("\n") == 1
 
 
+def rows_of(head):
+    """The first cells, in their order, of the table of docs/service.md whose first heading is `head`."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "service.md").read_text(encoding="utf-8")
+    below = page.split(f"| `{head}` | when |\n")[1].split("\n\n")[0].splitlines()
+    return [row.split("`")[1] for row in below if row.startswith("| `")]
+
+
+def test_the_page_has_a_row_for_every_reason_in_the_order_they_are_given_and_for_every_alarm():
+    assert rows_of("unknown") == [reason.value for reason in Unknown]
+    assert rows_of("alarm") == list(_CONDITIONS)
+
+
 @pytest.mark.parametrize("of", ["tare", "body"])
 def test_a_state_belongs_to_the_settings_it_was_made_with(of, tmp_path):
     (tmp_path / "file").write_text("1")
@@ -153,6 +168,29 @@ def test_a_state_belongs_to_the_settings_it_was_made_with(of, tmp_path):
     assert ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=2.0).state == (
         ArmSettings("panda", name="left", source="sim", save=str(tmp_path), rating=3.0).state
     )
+
+
+def test_a_state_goes_on_where_a_version_knows_more_settings_and_they_are_not_given():
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class Later(ArmSettings):
+        colour: str = "none"
+
+    now = ArmSettings("panda", name="left", source="sim", save="kept")
+    assert now.state.name == "left-e55ab740.npz"  # as the versions before have written it
+    for given in ({"steady": True}, {"mass": "1.2±0.1"}, {"family": "wide"}, {"tare": "e.csv", "tare_age": 0.0}):
+        state = ArmSettings("panda", name="left", source="sim", save="kept", **given).state
+        assert state != now.state
+        assert Later("panda", name="left", source="sim", save="kept", **given).state == state
+    assert Later("panda", name="left", source="sim", save="kept").state == now.state
+    assert Later("panda", name="left", source="sim", save="kept", colour="red").state != now.state
+
+
+@pytest.mark.parametrize("key", sorted(OF_THE_SERVICE))
+def test_a_setting_of_the_service_below_an_arm_is_told_where_it_belongs(key, tmp_path):
+    (tmp_path / "cell.toml").write_text(f'[[arm]]\nname = "left"\nsource = "sim"\nrobot = "panda"\n{key} = 1\n')
+    says = "unknown setting" if key == "duration" else f"{key} is of the service"  # --duration is no setting of a file
+    with pytest.raises(UsageError, match=says):
+        read_settings(tmp_path / "cell.toml")
 
 
 def test_a_state_belongs_to_the_folder_of_its_tare_as_it_was(tmp_path):

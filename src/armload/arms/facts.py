@@ -1,7 +1,7 @@
 """What is known of each built-in arm and no URDF says: one sheet per arm, `descriptions/NAME.toml`, with its sources.
 
-An arm is added by its sheet and its `descriptions/NAME.urdf`; nothing else names it. A key carries its unit, a table
-its source:
+An arm is added by its sheet and its `descriptions/NAME.urdf`; no other code names it but the list of arms whose hybrid
+is shipped (`armload.posterior.model_file`). A key carries its unit, a table its source:
 
     [payload]
     "rated [kg]" = 3.0

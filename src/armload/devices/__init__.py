@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armload.devices.load_file import read_load
     from armload.devices.mover import Mover, StreamedMover, samples_of_movement
     from armload.devices.opening import open_source
-    from armload.devices.opening_controllers import WITH_CONTROLLER, controller_of
+    from armload.devices.opening_controllers import controller_of, has_controller
     from armload.devices.opening_movers import open_mover
     from armload.devices.reader import Reader
     from armload.devices.recorder import Recorded, Recorder
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 __all__ = [
     "CONTROLLERS",
     "FORMS",
-    "WITH_CONTROLLER",
     "Controller",
     "Counted",
     "Detached",
@@ -68,6 +67,7 @@ __all__ = [
     "export_load",
     "flange_of",
     "franka_load",
+    "has_controller",
     "is_moving",
     "open_mover",
     "open_source",

@@ -173,6 +173,15 @@ class Address(NamedTuple):
         return Effort(arm, self.torque_constants or torque_constants, self.compensated)
 
 
+def written(scheme: str) -> str:
+    """How a robot's address is written, for messages.
+
+    >>> written("fr3"), written("ros2")
+    ('fr3://ADDRESS', 'ros2://TOPIC')
+    """
+    return f"{scheme}://{'TOPIC' if scheme == 'ros2' else 'ADDRESS'}"
+
+
 def address_of(name: str) -> Address:
     """What a robot's address says.
 
@@ -184,9 +193,10 @@ def address_of(name: str) -> Address:
         host = parts.netloc + parts.path if parts.scheme == "ros2" else parts.hostname
     except ValueError as error:
         raise SourceSetupError(f"{name} is no address ({error}): expected a host's name or IP address") from None
-    if not host:
+    if host is None or not host.strip("/"):
+        no, such = ("topic", "/joint_states") if parts.scheme == "ros2" else ("robot", "172.16.0.2")
         raise SourceSetupError(
-            f"{name} names no robot: expected {parts.scheme}://ADDRESS, such as {parts.scheme}://172.16.0.2"
+            f"{name} names no {no}: expected {written(parts.scheme)}, such as {parts.scheme}://{such}"
         )
     if parts.scheme != "ros2" and (parts.netloc.strip("[]").lower() != host.lower() or parts.path.strip("/")):
         raise SourceSetupError(

@@ -15,7 +15,16 @@ if TYPE_CHECKING:
 
 
 _FRANKA = ("fr3", "panda")
-WITH_CONTROLLER = (*_FRANKA, "ur")  # schemes of sources whose controller can be told a load
+
+
+def has_controller(spec: str) -> bool:
+    """Whether a load can be told to the controller behind a source.
+
+    >>> [has_controller(spec) for spec in ("fr3://172.16.0.2", "UR://192.168.0.10", "ros2:///joint_states", "sim")]
+    [True, True, False, False]
+    """
+    scheme, _, rest = spec.partition("://")
+    return bool(rest) and scheme.lower() in (*_FRANKA, "ur")
 
 
 def controller_of(spec: str, arm: Arm, present: Callable[[], Detached | None]) -> Controller:
@@ -28,7 +37,7 @@ def controller_of(spec: str, arm: Arm, present: Callable[[], Detached | None]) -
     Raises:
         SourceError: nothing can be written to this source, or its client is not installed.
     """
-    scheme = spec.partition("://")[0]
+    scheme = spec.partition("://")[0].lower()
     if scheme in _FRANKA:
         from armload.devices.franka.controller import FrankaController
 

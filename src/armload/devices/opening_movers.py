@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from armload.arms import Arm
 from armload.devices.mover import Mover
-from armload.devices.opening import SCHEMES, address_of
+from armload.devices.opening import SCHEMES, address_of, written
 from armload.devices.remote_mover import DetachedMover, RemoteMover
 from armload.devices.ros2.mover import CONTROLLER, Ros2Mover
 from armload.devices.simulator.mover import SimulatedMover
@@ -54,7 +54,7 @@ def open_mover(
         )
     scheme = spec.partition("://")[0].lower()
     if scheme not in SCHEMES:
-        raise SourceError(f"{spec} cannot be moved: expected sim, {', '.join(f'{s}://ADDRESS' for s in SCHEMES)}")
+        raise SourceError(f"{spec} cannot be moved: expected sim, {', '.join(map(written, SCHEMES))}")
     if scheme == "ros2":
         address = address_of(spec)
         return Ros2Mover(address.host, arm, address.controller or CONTROLLER, address.effort(arm))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armload.devices import WITH_CONTROLLER
+from armload.devices import has_controller
 from armload.errors import IdentificationError, UsageError
 from armload.identification.arm_options import ArmOptions
 from armload.identification.known_options import KnownOptions, centre, weighed
@@ -37,7 +37,16 @@ TOOL_OR_TARE = (  # but for a tare that is taken on the stream itself
     "tool, or the tare or profile"
 )
 _RATE = 1000.0  # [Hz] of the simulator, as of `open_source`
-_OF_THE_SERVICE = ("every", "host", "port", "token_file", "webhook", "headers", "mqtt", "spare")
+_NOT_IN_FILES = ("arms", "duration", "token")  # of `ServiceSettings`, which no file says
+_READ_ELSEWHERE = ("token_file",)  # a token has a file of its own, which is checked
+# what an arm's state says or does not change: the state goes on where one of these is another
+_BESIDE_STATE = ("save", "record", "rating", "com_range", "apply", "mounted")
+# settings that stand in the name of a state whatever they are; any other does where it is given, so that a state of a
+# version that had no such setting goes on
+_IN_STATE = (
+    *("name", "source", "robot", "frame", "gravity", "method"),
+    *("tare", "profile", "tool", "loop", "rate"),
+)
 _RANGES = {  # what numbers may be: in words, and between which two
     "every": ("a time above 0 s", 0.0, math.inf),
     "rating": ("a mass above 0 kg", 0.0, math.inf),
@@ -105,7 +114,7 @@ class ArmSettings(ArmOptions, KnownOptions):
         if self.apply not in (None, "auto"):
             raise UsageError(f'{self.name}: apply is {self.apply!r}: expected "auto"')
         check_arm(self)
-        if self.apply is not None and not self._has_controller:
+        if self.apply is not None and not has_controller(self.source):
             raise UsageError(
                 f"{self.name}: no load can be written to {self.source}: expected fr3://, panda:// or ur://"
             )
@@ -116,20 +125,12 @@ class ArmSettings(ArmOptions, KnownOptions):
         return self.source != "sim" and "://" not in self.source
 
     @property
-    def _has_controller(self) -> bool:
-        scheme, _, rest = self.source.partition("://")
-        return bool(rest) and scheme in WITH_CONTROLLER
-
-    @property
     def state(self) -> Path | None:
         """The file of the identifier's state. Other settings have another name: a state with another tare is none."""
         if self.save is None:
             return None
-        beside = ("save", "record", "rating", "com_range", "apply", "mounted")
-        asked = {key: value for key, value in self.to_dict().items() if key not in beside}
-        for key in ("steady", "tare_age", "mass", "com", "body", "family"):
-            if asked[key] is None or asked[key] is False:  # a state of a version that had no such setting goes on
-                del asked[key]
+        given = {f.name for f in dataclasses.fields(self) if f.name in _IN_STATE or getattr(self, f.name) != f.default}
+        asked = {key: value for key, value in self.to_dict().items() if key in given - {*_BESIDE_STATE}}
         asked["rate"] = _RATE if self.rate is None else self.rate  # as versions wrote it that had no other word for it
         for key in ("tare", "profile", "tool", "body"):
             if asked.get(key) is not None and ((path := Path(asked[key])).is_file() or path.is_dir()):
@@ -230,8 +231,7 @@ def read_settings(path: str | Path, **over: Any) -> ServiceSettings:
         raise UsageError(f"{path}: arm is no list of tables: expected [[arm]] before each")
     file = said.pop("token_file", None)
     arms = tuple(_arm(table, path) for table in tables)
-    # a token has a file of its own, which is checked
-    service = _checked(said, ServiceSettings, f"{path}", ("arms", "duration", "token"), ("token_file",))
+    service = _checked(said, ServiceSettings, f"{path}", _NOT_IN_FILES, _READ_ELSEWHERE)
     if file is not None:
         service["token"] = read_token(path.parent / str(file))
     return ServiceSettings(arms, **{**service, **over})
@@ -284,7 +284,8 @@ def _checked(
             known = ", ".join([*(name for name in fields if name not in without), *also])
             if kind is ServiceSettings:
                 known += "; settings of an arm below [[arm]]"
-            if kind is ArmSettings and key in _OF_THE_SERVICE:  # TOML counts what follows [[arm]] to that arm
+            of_service = {f.name for f in dataclasses.fields(ServiceSettings)} - {*_NOT_IN_FILES} | {*_READ_ELSEWHERE}
+            if kind is ArmSettings and key in of_service:  # TOML counts what follows [[arm]] to that arm
                 raise UsageError(f"{where}: {key} is of the service: write it above the first [[arm]]")
             raise UsageError(f"{where}: unknown setting {key!r}: expected some of {known}")
         expected, words = _KINDS[fields[key]]

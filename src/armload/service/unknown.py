@@ -15,7 +15,7 @@ CONFIRMED = 1.0  # [s] of samples after an interruption, before the answer of be
 class Unknown(StrEnum):
     """The reasons, the first that holds is told."""
 
-    STARTING = "starting"  # the arm's process is not there yet, or gave no answer yet
+    STARTING = "starting"  # the arm's process is not there yet, or gave no answer yet and no connection has failed
     COMPILING = "compiling"  # functions are compiled, which is done once for each machine
     SOURCE_LOST = "source lost"  # not connected: no robot, a killed reader, a stall of 3 s
     SOURCE_ENDED = "source ended"  # a log came to its end
