@@ -98,6 +98,20 @@ def test_what_is_known_is_of_the_payload_and_not_of_the_tool_beside():
     assert beside[1] == pytest.approx(alone[1])
 
 
+def test_an_error_of_the_tool_is_an_error_of_what_the_log_says_of_the_payload():
+    mean, C = gaussian(4)
+    tool, E = 0.5 * PHI[::-1], gaussian(5)[1]
+    known = Known(KnownMass(1.2, 2e-3), KnownCentre(COM, 1e-3))
+    beside = known.with_tool(tool).with_error(E)
+    alone = known.given(mean, C + E)
+    found = beside.given(mean + tool, C)
+    assert found[0] - tool == pytest.approx(alone[0])
+    assert found[1] == pytest.approx(alone[1])
+    off = mean + tool + 5.0 * np.sqrt(C[0, 0]) * np.eye(10)[0]  # five deviations of the log, a fifth of the tool's
+    assert known.with_tool(tool).denied(off, C)
+    assert not beside.with_error(625.0 * C).denied(off, C)
+
+
 def test_three_coordinates_are_as_seldom_denied_as_one_mass():
     assert chi.sf(FAR, 3) == pytest.approx(2.0 * norm.sf(HELD), rel=1e-3)
 

@@ -80,8 +80,8 @@ class Found(NamedTuple):
     kappa: by how much the physics overrates the log's evidence, of a method that knows.
     gain_std: relative standard deviation of the torque's scale, of a method that allows for one. gain_known: whether a
         known weight fixed it.
-    known: of the payload apart from the log. log_only: mean (10,) and covariance (10, 10) without that. denies_family:
-        whether the log denies the families that were given.
+    known: of the payload apart from the log. taken: whether the estimate rests on that, too. log_only: mean (10,) and
+        covariance (10, 10) without that. denies_family: whether the log denies the families that were given.
     health: the arm itself, of a method that asks.
     arm_known: what it is held against by `drift` and `another`: "tare", "profile", or "both".
     """
@@ -109,6 +109,7 @@ class Found(NamedTuple):
     restless_joint: int = 0
     exchanged: bool = False
     known: Known | None = None
+    taken: bool = False
     log_only: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     denies_family: bool = False
     kappa: float | None = None
@@ -128,9 +129,11 @@ class Found(NamedTuple):
         calibrated: whether that covariance is.
         """
         unprojected, log_only = (x and (x[0], x[1] + covariance) for x in (self.unprojected, self.log_only))
-        estimate = replace(self.estimate, covariance=self.estimate.covariance + covariance)
-        calibrated = calibrated and self.calibrated
-        return self._replace(estimate=estimate, unprojected=unprojected, log_only=log_only, calibrated=calibrated)
+        estimate, known = self.estimate, self.known and self.known.with_error(None)
+        if not self.taken:  # else it was in already: what is known tells of it, too
+            estimate = replace(estimate, covariance=estimate.covariance + covariance)
+        found = self._replace(estimate=estimate, unprojected=unprojected, log_only=log_only, known=known)
+        return found._replace(calibrated=calibrated and self.calibrated)
 
     def less(self, tool: NDArray[np.float64]) -> Found:
         """The same without a tool (10,)."""
@@ -213,6 +216,7 @@ def _found(choice: Choice, arm: Arm, recording: Recording, asked: Asked) -> Foun
         gain_std=None if posterior is None else posterior.posterior.gain_std,
         gain_known=gain_known,
         known=asked.known,
+        taken=posterior is not None and posterior.taken,
         log_only=None if posterior is None else posterior.log_only,
         denies_family=isinstance(identifier, HybridIdentifier) and identifier.denies_family,
         health=None if posterior is None else ArmHealth.of(posterior),

@@ -57,7 +57,7 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
             notes = (*notes, f"tool {mounted.name}: {INERTIA_ASSUMED}; the intervals allow for any other")
             unsure = known
     if tare is None and asked.profile is None:
-        arm = arm.with_payload(known)
+        arm, asked = arm.with_payload(known), replace(asked, known=asked.known and asked.known.with_error(error))
         found = found_in(recording, arm, None, asked).with_error(error, trusted)
         return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
     carried, sure = _carries(arm, known, tare, asked.profile)
@@ -69,7 +69,7 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
         found, relative_to = found_in(recording, arm, tare, asked), "profile" if tare is None else "tare"
         note, otherwise = f"the tool was mounted {before} already", -known.phi
     else:
-        both = asked.known and asked.known.with_tool(known.phi)  # what was added since the tare
+        both = asked.known and asked.known.with_tool(known.phi).with_error(error)  # what was added since the tare
         found, relative_to = found_in(recording, arm, tare, replace(asked, known=both)).less(known.phi), "tool"
         found = found.with_error(error, trusted)
         note, otherwise = f"the tool was mounted {since}: the answer is what was added since, less the tool", known.phi

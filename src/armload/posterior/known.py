@@ -9,6 +9,9 @@ S = H·C·Hᵀ + R and K = C·Hᵀ·S⁻¹
     a centre r ± s [m]      H = (−r, 1, 0 …),      z = 0,  R = s²·E[m²]·1      m·(com − r) ~ N(0, (s·m)²) on each axis
     a body phi_0            H = 1,                 z = phi_0,  R its covariance
 
+A tool whose own phi is known but for an error ~ N(0, E) leaves phi ~ N(mean, C + E) for what it carries: E goes into C
+before anything is asked or taken, so that a weighed mass tells of the tool, too.
+
 An error of the torque's scale, which mass and moments have in common, goes with the error of the mass, and leaves the
 centre alone. Families of payloads are no measurement: they say which components of a learned prior count.
 """
@@ -161,6 +164,7 @@ class Known:
 
     Args:
         mass, com, body: None: not known.
+        error: covariance (10, 10) of the error of a tool's phi, which an estimate's own lacks; None: there is none.
         families: those it is of, by the names of the learned prior (`MixturePrior.only`); none: any.
         tool: phi (10,) of a tool that is held with it, in an estimate of both.
         if_held: whether it is taken only where an estimate holds something, and does not deny that this is it: a stream
@@ -173,6 +177,7 @@ class Known:
     if_held: bool = False
     body: KnownBody | None = None
     families: tuple[str, ...] = ()
+    error: NDArray[np.float64] | None = None
 
     @classmethod
     def of(
@@ -199,6 +204,10 @@ class Known:
         """The same of an estimate that holds a tool (10,), too."""
         return replace(self, tool=tool)
 
+    def with_error(self, error: NDArray[np.float64] | None) -> Self:
+        """The same of an estimate whose covariance lacks that of a tool's error (10, 10)."""
+        return replace(self, error=error)
+
     @property
     def _measured(self) -> list[KnownMass | KnownCentre | KnownBody]:
         return [one for one in (self.mass, self.com, self.body) if one is not None]
@@ -213,7 +222,7 @@ class Known:
         self, mean: NDArray[np.float64], covariance: NDArray[np.float64]
     ) -> tuple[KnownMass | KnownCentre | KnownBody, ...]:
         """Those of them that phi ~ N(mean, covariance) denies, beyond `HELD`, `FAR` and `UNLIKE`."""
-        own = self._own(mean)
+        own, covariance = self._own(mean), self._all_of(covariance)
         most = {KnownMass: HELD, KnownCentre: FAR, KnownBody: UNLIKE}
         return tuple(one for one in self._measured if one.away(own, covariance) > most[type(one)])
 
@@ -228,9 +237,10 @@ class Known:
         """phi ~ N(mean, covariance), (10,), (10, 10), given what of it that does not deny; None: nothing is taken.
 
         Between two values that cannot both be true lies none that is: what is denied is left out. With `if_held` all
-        is, then, and where nothing is held.
+        is, then, and where nothing is held. The covariance that is given back holds the tool's `error`.
         """
         own, denied = self._own(mean), self.denied(mean, covariance)
+        covariance = self._all_of(covariance)
         if self.if_held:
             least = max(HELD * float(np.sqrt(covariance[0, 0])), LIGHTEST_HELD)
             if own[0] <= least or denied:
@@ -245,6 +255,10 @@ class Known:
     def _own(self, mean: NDArray[np.float64]) -> NDArray[np.float64]:
         """Less the tool."""
         return mean if self.tool is None else mean - self.tool
+
+    def _all_of(self, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """With the tool's error."""
+        return covariance if self.error is None else covariance + self.error
 
 
 def _among(one: Any, others: Sequence[Any]) -> bool:
