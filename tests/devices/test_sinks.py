@@ -37,8 +37,9 @@ from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError, S
 from armload.identification import Identification
 from armload.identification.answer import Segment
 from armload.identification.intervals import intervals
-from armload.inertia import NAMES, InertialParameters, is_consistent
+from armload.inertia import NAMES, InertialParameters, inertia_com_std, is_consistent
 from armload.payloads import INERTIA_ASSUMED, franka_hand, hand_on, random_payload, test_payload, write_payload
+from armload.payloads.uncertainty import Uncertainty
 
 FLANGES = {
     "panda": "panda_link8",
@@ -547,7 +548,9 @@ def test_moments_that_a_part_leaves_smaller_than_their_intervals_are_said_to_be_
     half = 0.5 * np.diag(INERTIA) * (1.1, 0.9, 1.1)  # of the interval of each moment
     assert np.all(np.diag(whole.inertia_com) > 2 * half)
     low, high = (whole.inertia_com + sign * np.diag(half) for sign in (-1, 1))
-    result = replace(identification(whole), inertia_com_low=low, inertia_com_high=high)
+    spread = np.zeros((10, 10))
+    spread[[4, 7, 9], [4, 7, 9]] = (half / 1.96) ** 2
+    result = replace(identification(whole), inertia_com_low=low, inertia_com_high=high, covariance=spread)
     (tmp_path / "held.json").write_text(json.dumps(result.to_dict()))
     for load in (Load.of(result), read_load(tmp_path / "held.json")):
         assert HARDLY_KNOWN not in export_load(load, "franka")
@@ -563,7 +566,6 @@ def test_a_load_and_a_measured_part_are_as_uncertain_as_both_and_lack_what_eithe
         InertialParameters([0.02, *[0.0] * 3, 1e-5, 0, 0, 1e-5, 0, 1e-5]),
         std=std,
         determined=tuple([True] * 9 + [False]),
-        moment_widths=np.full(3, 1e-5),
     )
     rng = np.random.default_rng(0)
     drawn = rng.normal(scale=std, size=(20_000, 10)) - rng.normal(scale=std, size=(20_000, 10))
@@ -575,6 +577,33 @@ def test_a_load_and_a_measured_part_are_as_uncertain_as_both_and_lack_what_eithe
     assert (whole - part).seems_nothing  # 0.10 kg, three deviations of the two: 0.127 kg
 
 
+def test_moments_of_what_was_put_together_are_as_uncertain_as_draws_of_its_parts_are():
+    held = InertialParameters.from_com(0.8, (0.03, 0.0, 0.14), np.diag([1e-3, 1.2e-3, 0.8e-3]), "panda_link8")
+    hand = franka_hand().parameters
+    # an error of the centre hardly shows in the inertia about it, until something else moves the centre
+    spread = Uncertainty(mass=0.06, com=0.025, inertia=0.1).covariance(held)
+    result = replace(
+        identification(held, relative_to="tare"),
+        covariance=spread,
+        inertia_com_low=held.inertia_com - 2e-4,
+        inertia_com_high=held.inertia_com + 2e-4,
+    )
+    measured = Load.of(result)
+    assert not any(HARDLY_KNOWN in remark for remark in measured.remarks)
+    panda = arm("panda")
+    for load in (measured + hand, (measured + hand).about("panda_link7", panda)):
+        drawn = (
+            np.random.default_rng(1).multivariate_normal(held.phi, 1e-4 * spread, 4000) + hand.phi
+        )  # small: first order
+        moments = np.array([np.diag(InertialParameters(phi).inertia_com) for phi in drawn])
+        wide = 2 * 1.96 * 100 * moments.std(axis=0)
+        np.testing.assert_allclose(
+            2 * 1.96 * inertia_com_std(load.parameters.phi, load.covariance)[[0, 3, 5]], wide, rtol=0.1
+        )
+        assert np.array_equal(wide > np.diag((held + hand).inertia_com), [True, True, False])
+        assert f"{HARDLY_KNOWN}: Ixx, Iyy" in load.remarks
+
+
 def test_a_part_says_how_well_it_is_known(tmp_path):
     tool = {"mass": 0.7, "com": [0, 0, 0.05], "inertia_com": np.diag([1e-3, 1.2e-3, 1.5e-3]).tolist()}
     (tmp_path / "tool.json").write_text(json.dumps(tool | {"std": {"mass": 0.02, "inertia": 0.4}}))
@@ -582,7 +611,9 @@ def test_a_part_says_how_well_it_is_known(tmp_path):
     assert load.std is not None
     # moments of 1, 1.2 and 1.5 g·m², 95 % of which is ±1.96·0.4·1.23 g·m²: wider than any
     assert load.std[0] == pytest.approx(0.02)
-    np.testing.assert_allclose(load.moment_widths, 2 * 1.96 * 0.4 * 3.7e-3 / 3, rtol=1e-3)
+    np.testing.assert_allclose(
+        1.96 * inertia_com_std(load.parameters.phi, load.covariance)[[0, 3, 5]], 0.97e-3, rtol=5e-3
+    )
     assert f"{HARDLY_KNOWN}: Ixx, Iyy, Izz" in "\n".join(load.description())
 
 

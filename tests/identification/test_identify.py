@@ -19,7 +19,9 @@ from armload.identification.thresholds import MISFIT
 from armload.inertia import Z95, InertialParameters, distance_to_body, is_consistent, nearest_body
 from armload.lab.episodes import Recipe, draw_episodes, simulate_episodes
 from armload.motion import random_motion, taie2024
+from armload.payloads import Payload
 from armload.payloads import test_payload as box_of_the_examples
+from armload.payloads.uncertainty import Uncertainty
 from armload.posterior import PosteriorLeastSquares, shipped_model
 from armload.recording import Recording, read_recording, shared_samples
 from armload.recording.copies import copied_samples
@@ -271,6 +273,27 @@ def test_a_tool_mounted_after_the_tare_is_taken_off_the_answer(panda, simulated)
         assert answer.relative_to == relative_to
         assert answer.phi_low[0] < BOX.mass < answer.phi_high[0]
         assert any(said in note for note in answer.notes)
+
+
+@pytest.mark.parametrize("tared", [True, False])
+def test_a_weighed_mass_is_believed_beside_a_tool_that_is_hardly_known_and_tells_of_it(panda, simulated, tared):
+    lighter = InertialParameters(0.85 * TOOL.phi)  # 0.12 kg too light, of which 0.06 kg is one standard deviation
+    tool = Payload("gripper", lighter, uncertainty=Uncertainty(mass=0.06, com=0.002, inertia=0.1))
+    log, tare = simulated("both", 3), simulated("nothing", 4, "tare") if tared else None
+    alone = identify(log, panda, tare=tare, tool=tool)
+    assert alone.phi_low[0] < BOX.mass < alone.phi_high[0]
+    assert alone.phi_high[0] - alone.phi_low[0] > 2 * Z95 * 0.06
+    answer = identify(log, panda, tare=tare, tool=tool, mass=(BOX.mass, 2e-3))
+    assert answer.mass == pytest.approx(BOX.mass, abs=4e-3)
+    assert answer.phi_high[0] - answer.phi_low[0] == pytest.approx(2 * Z95 * 2e-3, rel=0.1)
+    assert np.all((answer.com_low < BOX.com) & (BOX.com < answer.com_high))
+    if tared:  # what is left of the tool's error is no longer taken for the payload's moments
+        assert np.linalg.norm(answer.com - BOX.com) < 0.5 * np.linalg.norm(alone.com - BOX.com)
+    assert not any("is not what the log says" in note for note in answer.notes)
+    other = identify(log, panda, tare=tare, tool=tool, mass=(BOX.mass + 0.5, 2e-3))  # beyond the tool's error, too
+    assert any("is not what the log says" in note for note in other.notes)
+    np.testing.assert_allclose(other.phi, alone.phi)
+    np.testing.assert_allclose(other.covariance, alone.covariance)
 
 
 def test_a_tool_in_grams_is_refused(panda, analytic_log):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armload.devices import load_remarks as remarks_on
 from armload.errors import SinkError
-from armload.inertia import NAMES, Z95, InertialParameters, held, is_consistent, to_order
+from armload.inertia import NAMES, InertialParameters, held, is_consistent, to_order
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -42,9 +42,9 @@ class Load:
         robot: name of the arm it was identified on.
         relative_to: "arm" (everything on the flange), "tool", "tare" or "before" (what was added), None: not
             known.
-        std: standard deviation of phi (10,), where it was measured.
+        std: standard deviation of phi (10,), where it was measured; that of `covariance`, where there is one.
         remarks: what else its reader should know, a line each.
-        moment_widths: of the intervals of its moments of inertia about the centre of mass (3,), where measured.
+        covariance: (10, 10) of phi, where it was measured and more is known of its errors than how large each is.
     """
 
     parameters: InertialParameters
@@ -53,13 +53,15 @@ class Load:
     relative_to: str | None = None
     std: NDArray[np.float64] | None = field(default=None, repr=False)
     remarks: tuple[str, ...] = field(default=(), repr=False)
-    moment_widths: NDArray[np.float64] | None = field(default=None, repr=False)
+    covariance: NDArray[np.float64] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         determined = tuple(bool(x) for x in self.determined)
         if len(determined) != 10:
             raise SinkError(f"determined has {len(determined)} entries: expected 10, one for each parameter")
         object.__setattr__(self, "determined", determined)
+        if self.covariance is not None:
+            object.__setattr__(self, "std", np.sqrt(np.diag(self.covariance)))
 
     @classmethod
     def of(cls, result: Load | Identification | OnlineEstimate, arm: Arm | None = None) -> Load:
@@ -71,8 +73,8 @@ class Load:
         if isinstance(result, OnlineEstimate):
             known, robot = tuple(bool(x) for x in result.determined), None if arm is None else arm.name
             remarks = remarks_on.doubted(result.interval) + remarks_on.leaning(known, result.rests_on_prior.tolist())
-            return cls(result.parameters, known, robot, result.relative_to, result.std, remarks)
-        std = (result.phi_high - result.phi_low) / (2 * Z95)
+            remarks += remarks_on.loose_of(result.parameters, result.covariance, known)
+            return cls(result.parameters, known, robot, result.relative_to, None, remarks, result.covariance)
         known, resting = tuple(result.determined.tolist()), result.rests_on_prior.tolist()
         widths = np.diag(result.inertia_com_high - result.inertia_com_low)
         remarks = (
@@ -81,7 +83,7 @@ class Load:
             + remarks_on.leaning(known, resting)
         )
         remarks += remarks_on.loose(np.diag(result.inertia_com), widths, known)
-        return cls(result.parameters, known, result.robot, result.relative_to, std, remarks, widths)
+        return cls(result.parameters, known, result.robot, result.relative_to, None, remarks, result.covariance)
 
     @property
     def frame(self) -> str | None:
@@ -133,8 +135,8 @@ class Load:
     def about(self, frame: str | None, arm: Arm | None = None) -> Load:
         """The same load about another frame fixed to the arm's last moving link; see `about`.
 
-        What was not measured stays so: a parameter counts as measured where all are that it is computed from. Its
-        deviation is that of errors which are independent about the old frame.
+        What was not measured stays so: a parameter counts as measured where all are that it is computed from. Without a
+        covariance its deviation is that of errors which are independent about the old frame.
         """
         moved = about(self.parameters, frame, arm)
         if arm is None or frame is None or self.frame in (None, frame):
@@ -144,10 +146,10 @@ class Load:
         T = from_frame(replace(arm, frame=frame, attached=None), str(self.frame))
         known = tuple(all(np.array(self.determined)[np.abs(row) > _NONE]) for row in T)
         std = None if self.std is None else np.sqrt(T**2 @ self.std**2)
+        covariance = None if self.covariance is None else T @ self.covariance @ T.T
         turned = bool(np.any(np.abs(T[1:4, 1:4] - np.eye(3)) > _NONE))
         remarks = tuple(remarks_on.of_axes(remark, str(self.frame)) if turned else remark for remark in self.remarks)
-        widths = None if turned else self.moment_widths
-        return replace(self, parameters=moved, determined=known, std=std, moment_widths=widths, remarks=remarks)
+        return replace(self, parameters=moved, determined=known, std=std, covariance=covariance, remarks=remarks)
 
     def as_body(self) -> Load:
         """The nearest load that a body can have, in units of its standard deviations; itself where it is one.
@@ -201,7 +203,7 @@ class Load:
             self,
             determined=tuple(a and b for a, b in zip(self.determined, part.determined, strict=True)),
             std=_beside(self.std, part.std),
-            moment_widths=_beside(self.moment_widths, part.moment_widths),
+            covariance=_together(self, part),
             remarks=remarks_on.beside(self.remarks, part.remarks),
         )
         return replace(both.with_parameters(parameters), relative_to=relative_to if self.relative_to else None)
@@ -209,9 +211,9 @@ class Load:
     def with_parameters(self, parameters: InertialParameters) -> Load:
         """Other parameters, as uncertain as before: of smaller moments that may be more than they are."""
         remarks = self.remarks
-        if self.moment_widths is not None and parameters.mass > 0:
+        if self.covariance is not None and parameters.mass > 0:
             remarks = tuple(remark for remark in remarks if not remark.startswith(remarks_on.HARDLY_KNOWN))
-            remarks += remarks_on.loose(np.diag(parameters.inertia_com), self.moment_widths, self.determined)
+            remarks += remarks_on.loose_of(parameters, self.covariance, self.determined)
         return replace(self, parameters=parameters, remarks=remarks)
 
 
@@ -220,6 +222,13 @@ def _beside(one: NDArray[np.float64] | None, other: NDArray[np.float64] | None) 
     if one is None or other is None:
         return other if one is None else one
     return np.hypot(one, other)
+
+
+def _together(one: Load, other: Load) -> NDArray[np.float64] | None:
+    """The covariance (10, 10) of both together; None: nothing is measured, or only how large each error is."""
+    if one.std is None or other.std is None:
+        return other.covariance if one.std is None else one.covariance
+    return None if one.covariance is None or other.covariance is None else one.covariance + other.covariance
 
 
 def about(parameters: InertialParameters, frame: str | None, arm: Arm | None = None) -> InertialParameters:

@@ -12,7 +12,7 @@ import numpy as np
 from armload.devices import load_remarks as remarks_on
 from armload.devices.load import Load
 from armload.errors import SinkError
-from armload.inertia import Z95, inertia_com_std
+from armload.inertia import Z95
 from armload.payloads.payload_file import payload_from, read_content
 
 
@@ -35,8 +35,7 @@ def read_load(path: str | Path) -> Load:
         load = Load(parameters, robot=robot, relative_to=relative_to, remarks=remarks_on.assumed(payload))
         if not payload.covariance.any():
             return load
-        widths = 2 * Z95 * inertia_com_std(parameters.phi, payload.covariance)[[0, 3, 5]]
-        return replace(load, std=np.sqrt(np.diag(payload.covariance)), moment_widths=widths).with_parameters(parameters)
+        return replace(load, covariance=payload.covariance).with_parameters(parameters)
     std = None
     try:
         low, high = (np.array(content[key], dtype=float) for key in ("phi_low", "phi_high"))
@@ -47,15 +46,14 @@ def read_load(path: str | Path) -> Load:
     resting = _flags(content, "rests_on_prior", path) or (False,) * 10
     remarks = remarks_on.doubted(content.get("interval")) + remarks_on.of_a_part(content.get("segments"))
     remarks += remarks_on.leaning(determined, resting) + remarks_on.assumed(payload)
-    widths = None
     try:
         inertia = (content[key] for key in ("inertia_com", "inertia_com_low", "inertia_com_high"))
         value, low, high = (np.diag(np.array(x, dtype=float)) for x in inertia)
         remarks += remarks_on.loose(value, high - low, determined)
-        widths = high - low if np.shape(high - low) == (3,) else None
     except (KeyError, TypeError, ValueError, OverflowError):
         pass
-    return Load(parameters, determined, robot, relative_to, std, remarks, widths)
+    covariance = payload.covariance if std is not None and payload.covariance.any() else None
+    return Load(parameters, determined, robot, relative_to, std, remarks, covariance)
 
 
 def _flags(content: dict[str, Any], key: str, path: str | Path) -> tuple[bool, ...] | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.inertia import NAMES
+from armload.inertia import NAMES, Z95, InertialParameters, inertia_com_std
 
 if TYPE_CHECKING:
     from armload.payloads import Payload
@@ -80,3 +80,11 @@ def loose(value: NDArray, widths: NDArray | None, known: Sequence[bool]) -> tupl
     which = widths is not None and np.shape(value) == np.shape(widths) == (3,) and (widths > value)
     names = [NAMES[k] for k, hardly in zip(_MOMENTS, np.broadcast_to(which, 3), strict=True) if hardly and known[k]]
     return (f"{HARDLY_KNOWN}: {', '.join(names)}",) if names else ()
+
+
+def loose_of(body: InertialParameters, covariance: NDArray, known: Sequence[bool]) -> tuple[str, ...]:
+    """The same of a body whose phi has a covariance (10, 10): to first order, about its own centre of mass."""
+    if not body.mass > 0.0:
+        return ()
+    moments = [0, 3, 5]  # of xx, xy, xz, yy, yz, zz
+    return loose(np.diag(body.inertia_com), 2.0 * Z95 * inertia_com_std(body.phi, covariance)[moments], known)

@@ -87,7 +87,10 @@ def allowing_for(
     if known is None or log_only is None or not known.which.any():
         return replace(estimate, covariance=estimate.covariance + error.covariance)
     alone = log_only[0], log_only[1] + error.covariance
-    mean, covariance = known.given(*alone) or alone
+    given = known.given(*alone)
+    if given is None and known.given(*log_only) is None:  # nor does the answer rest on it
+        return replace(estimate, covariance=estimate.covariance + error.covariance)
+    mean, covariance = given or alone
     body = near_consistent(mean, np.linalg.inv(covariance)) if quick else nearest_body(mean, covariance)
     return replace(estimate, phi=body, covariance=covariance)
 

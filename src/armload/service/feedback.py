@@ -182,7 +182,7 @@ class Feedback:
         share = min(1.0, STEP / max(most, 1e-12))
         told = wanted if share == 1.0 else InertialParameters(counted.load.phi + share * difference.phi, wanted.frame)
         try:
-            self._controller.put(replace(found, parameters=told, std=None))
+            self._controller.put(replace(found, parameters=told, std=None, covariance=None))
             self.mass, self._under_way = read_back(told, lambda: self._controller.counted().load).mass, True
         except Exception as error:
             self._not_taken = (wanted, time.monotonic() + self._backoff.failed(0.0), one_line(error))
@@ -213,7 +213,7 @@ class Feedback:
             found = found.as_body()
         else:
             nothing = InertialParameters.zero(self._arm.frame)
-            found = replace(found, parameters=nothing, determined=(True,) * 10, std=None)
+            found = replace(found, parameters=nothing, determined=(True,) * 10, std=None, covariance=None)
         if self._mounted is not None and end_effector == 0.0 and found.relative_to not in (None, "arm"):
             found = found + self._bare.in_frame(self._mounted)
         return found
