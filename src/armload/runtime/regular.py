@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import stat
-from pathlib import Path
+from os import PathLike
 
 
-def check_regular(path: str | Path) -> None:
+def check_regular(path: str | PathLike[str]) -> None:
     """See that what is to be opened is a regular file, or a link to one.
 
     Raises:
