@@ -6,16 +6,20 @@ import json
 import os
 import re
 import signal
+import threading
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from armload.app.cli import main
-from armload.app.cli.live import _learn
+from armload.app.cli import main, outputs
+from armload.app.cli.learning import learn_from
+from armload.app.cli.outputs import contents_of, replacing_unchanged
 from armload.app.cli.profile_text import next_steps, of_motors, print_profile
 from armload.arms import arm
+from armload.errors import UsageError
 from armload.inertia import InertialParameters
 from armload.motion import random_motion, save_motion, taie2024
 from armload.online import OnlineIdentifier
@@ -323,7 +327,7 @@ def test_sessions_of_one_robot_s_streams_are_told_apart_by_when_they_were(profil
     path, known = tmp_path / "arm.profile", load_profile(profile)
     named = SimpleNamespace(learned=lambda name, now: replace(now, sessions=(replace(known.sessions[0], name=name),)))
     path.write_bytes(profile.read_bytes())
-    _learn(SimpleNamespace(source=SimpleNamespace(name="panda://10.0.0.2"), identifier=named), str(path))
+    learn_from(SimpleNamespace(source=SimpleNamespace(name="panda://10.0.0.2"), identifier=named), str(path))
     capsys.readouterr()
     assert main(["profile", "show", str(path)]) == 0
     assert re.search(r"10\.0\.0\.2 20\d\d-\d\d-\d\d \d\d:\d\d", capsys.readouterr().out)
@@ -397,6 +401,54 @@ def test_a_profile_that_another_program_changed_meanwhile_is_left_so(folder, pro
     assert said.out == ""
     assert "changed by another program" in said.err
     assert path.read_bytes() == b"of another program"
+
+
+@pytest.mark.parametrize("by", ["update", "stream"])
+def test_a_profile_is_written_while_nobody_else_may_write_it(by, folder, profile, tmp_path, monkeypatch):
+    """Of two commands that end at once, the later one finds what the earlier one has written."""
+    import armload.posterior
+
+    path, known, alone = tmp_path / "shared.profile", load_profile(profile), []
+    path.write_bytes(profile.read_bytes())
+
+    def save(*given):
+        second = replacing_unchanged("--out", str(path), contents_of(str(path)))
+        with pytest.raises(UsageError, match=r"shared\.profile is being written by another program"), second:
+            pass
+        alone.append(save_profile(*given))
+
+    monkeypatch.setattr(outputs, "_WRITES", 0.0)
+    monkeypatch.setattr(armload.posterior, "save_profile", save)
+    if by == "update":
+        monkeypatch.setattr(armload.posterior, "learn_profile", lambda *_, **__: known)
+        assert main(["profile", str(folder / "day3.csv"), "--robot", "panda", "--out", str(path), "--update"]) == 0
+    else:
+        named = SimpleNamespace(learned=lambda *_: known)
+        learn_from(SimpleNamespace(source=SimpleNamespace(name="panda://10.0.0.2"), identifier=named), str(path))
+    assert alone == [path]
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_of_two_that_replace_a_file_at_once_the_second_is_told_that_it_has_changed(tmp_path):
+    path, told = tmp_path / "shared", []
+    path.write_text("before")
+    before = contents_of(str(path))
+
+    def other():
+        try:
+            with replacing_unchanged("--out", str(path), before):
+                path.write_text("the other's")
+        except UsageError as error:
+            told.append(str(error))
+
+    thread = threading.Thread(target=other)
+    with replacing_unchanged("--out", str(path), before):
+        thread.start()
+        time.sleep(0.2)
+        path.write_text("the first's")
+    thread.join()
+    assert told == [f"--out {path} was changed by another program meanwhile: it is left so; ask once more"]
+    assert path.read_text() == "the first's"
 
 
 def _said(words, capsys):

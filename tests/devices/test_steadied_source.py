@@ -132,6 +132,19 @@ def test_a_stream_of_coarse_velocities_is_told_how_they_can_be_steadied_and_then
     assert last[True]["phi_low"][0] <= mass <= last[True]["phi_high"][0]
 
 
+@pytest.mark.full  # some seconds
+def test_beside_a_profile_nobody_is_told_to_steady_velocities_without_leaving_it_out(logs, tmp_path, capsys):
+    """`--steady` beside `--profile` is refused."""
+    run, empty, _ = logs
+    path = tmp_path / "arm.profile"
+    assert main(["profile", str(empty), "--robot", "gen3", "--out", str(path)]) == 0
+    capsys.readouterr()
+    assert main(["live", str(run), "--robot", "gen3", "--profile", str(path), "--headless", "--speed", "max"]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "steady them" in line]
+    assert len(told) == 1
+    assert "give a tare in place of the profile, and steady them (" in told[0]
+
+
 def test_velocities_that_are_no_velocities_are_doubted_as_they_came(logs):
     """In degrees per second: told by the positions, too, they look like velocities."""
     robot, (run, _, _) = arm("gen3"), logs

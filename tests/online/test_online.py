@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import threading
 import time
 from copy import deepcopy
 from dataclasses import fields, replace
@@ -445,6 +446,26 @@ def test_a_state_does_not_grow(panda, online, tmp_path):
         sizes.append(online.save(tmp_path / f"{turn}.npz").stat().st_size)
     # a hundred rows that wait to be handed over, 1.4 MB, come and go; those of a turn would be 4 MB
     assert sizes[2] <= sizes[1] + 1_500_000
+
+
+def test_a_state_is_neither_looked_for_in_a_pipe_nor_written_into_one(panda, online, log, tmp_path):
+    """A stream would wait there for ever."""
+    path, said = tmp_path / "state.npz", []
+    os.mkfifo(path)
+    fed(online, list(log)[:50])
+
+    def asked():
+        for ask in (lambda: online.save(path), lambda: saved_at(path), lambda: OnlineIdentifier.restore(path, panda)):
+            try:
+                ask()
+            except (OSError, IdentificationError) as error:
+                said.append(str(error))
+
+    thread = threading.Thread(target=asked, daemon=True)
+    thread.start()
+    thread.join(60.0)
+    assert len(said) == 3
+    assert all("it is no regular file" in text for text in said)
 
 
 def test_a_state_of_another_arm_or_no_state_is_refused(panda, online, log, tmp_path):

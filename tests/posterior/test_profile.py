@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -204,6 +207,20 @@ def test_a_file_that_is_no_profile_is_refused_by_name(tmp_path, damage):
         path.write_bytes(damage)
     with pytest.raises(ModelError, match=r"x\.profile"):
         load_profile(path)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder"])
+def test_what_is_no_regular_file_is_no_profile_and_nobody_waits_for_it(kind, tmp_path):
+    """In a process of its own: the library that opens it would wait for ever, and no signal would end it."""
+    path = tmp_path / "x.profile"
+    os.mkfifo(path) if kind == "pipe" else path.mkdir()
+    command = [sys.executable, "-m", "armload", "profile", "show", str(path)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120.0, check=False)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr == (
+        f"armload: {path} is not a readable profile (it is no regular file): expected a file that `armload profile` "
+        "wrote; copy it again\n"
+    )
 
 
 @pytest.mark.parametrize("where", [0.3, 0.6, 0.95])

@@ -83,6 +83,25 @@ def test_a_state_is_gone_on_from_while_the_arm_is_that_of_the_same_session(
         found.close()
 
 
+@pytest.mark.parametrize(("session", "anew"), [(0.6, True), (3600.0, False)])
+def test_a_stream_begins_anew_when_its_robot_was_away_for_longer_than_a_session(
+    session, anew, panda, analytic_log, tmp_path, monkeypatch
+):
+    """As from a state of that age: the arm may have been repaired or exchanged over night."""
+    path, log = tmp_path / "run.csv", analytic_log(panda, test_payload().parameters, duration=3.0)
+    away = log.t >= log.t[0] + 1.5
+    write_recording(path, replace(log, t=log.t + 1.5 * away))  # a pause, during which it replays nothing
+    monkeypatch.setattr("armload.service.absence.SESSION", session)
+    settings = ArmSettings(name="left", source=str(path), robot="panda", method="map")
+    process, notes, counts = ArmProcess(settings, 0.1), [], []
+    monkeypatch.setattr(process, "note", notes.append)
+    monkeypatch.setattr(process, "_say", lambda one, _: counts.append(0 if one is None else one.n_samples))
+    process.run()
+    assert any("no sample for" in note and note.endswith("begun anew") for note in notes) == anew
+
+    assert (counts[-1] <= 0.6 * len(log)) == anew
+
+
 def test_a_state_of_another_version_is_said_to_be_that_and_the_stream_begins_anew(
     panda, analytic_log, tmp_path, monkeypatch
 ):

@@ -207,6 +207,7 @@ class OnlineIdentifier:
 
         Raises:
             IdentificationError: the method keeps something that cannot be written.
+            OSError: it cannot be written there, or what is there is no regular file.
         """
         state = {k: v for k, v in self.__getstate__().items() if k not in ("arm", "profile", "_every")}
         return save_state(path, state, self.arm, self.method, self._engine)

@@ -9,7 +9,7 @@ import json
 import math
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from armload.estimators import Identifier
 from armload.runtime.atomic import replacing
 from armload.runtime.content import digest_of_numbers
 from armload.runtime.packing import Packer, Unpacker
+from armload.runtime.regular import check_regular
 
 FORMAT = 30
 
@@ -31,7 +32,10 @@ def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, metho
 
     Raises:
         IdentificationError: the method keeps something that cannot be written.
+        OSError: it cannot be written there, or what is there is no regular file.
     """
+    with suppress(FileNotFoundError):
+        check_regular(path)  # a pipe would keep the stream until somebody reads it
     packer = Packer(_known(arm, engine))
     try:
         tree = packer.node(state)
@@ -78,6 +82,7 @@ def saved_at(path: str | PathLike[str]) -> float:
 def _opened(path: str | PathLike[str]) -> Iterator[tuple[dict[str, Any], Any]]:
     """What a state says, and its arrays; whatever is wrong with them is an `IdentificationError`."""
     try:
+        check_regular(path)
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
             yield json.loads(data["tree"].tobytes().decode()), data
     except FileNotFoundError:

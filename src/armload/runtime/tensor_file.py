@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from armload.errors import ArmloadError, ModelError, one_line
 from armload.runtime.atomic import replacing
 from armload.runtime.content import content_digest
+from armload.runtime.regular import check_regular
 
 _DIGEST = "sha256"
 Made = TypeVar("Made")
@@ -89,6 +90,7 @@ class TensorFile:
         from safetensors import SafetensorError, safe_open
 
         try:
+            check_regular(path)
             with safe_open(path, framework="np") as file:
                 return self.header in (file.metadata() or {})
         except (SafetensorError, OSError, ValueError, TypeError):
@@ -98,6 +100,7 @@ class TensorFile:
         from safetensors import SafetensorError, safe_open
 
         try:
+            check_regular(path)  # the library waits for a pipe's writer, and no signal ends it
             with safe_open(path, framework="np") as file:
                 text = (file.metadata() or {}).get(self.header)
                 tensors = {key: np.ascontiguousarray(file.get_tensor(key)) for key in file.keys()}  # noqa: SIM118

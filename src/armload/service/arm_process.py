@@ -31,6 +31,7 @@ from armload.posterior.drift import SESSION
 from armload.recording import Sample, check_own_measurements, read_recording
 from armload.runtime.atomic import clear_left_over, kept_alone
 from armload.runtime.compiling import COMPILING, compiling
+from armload.service.absence import Absence
 from armload.service.catching_up import CatchingUp
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
@@ -42,6 +43,7 @@ from armload.service.unknown import Unknown, Why, why_unknown
 
 SAVE_EVERY = 60.0  # [s] of what a kill may cost; saving takes the stream a tenth of a second
 _ENDS = 15.0  # [s] the process of a service that was killed may take to save and end: seconds on busy cores
+_CHANGED = "and offsets and friction change within hours"
 
 
 class ArmProcess:
@@ -83,8 +85,12 @@ class ArmProcess:
             try:
                 if self.settings.apply is not None:
                     self._feedback = self._made_feedback()
+                absence = Absence()
                 for _ in session.estimates():
                     now = time.monotonic()
+                    if (gone := absence.ended(session.sample, now)) is not None:
+                        self.note(f"no sample for {in_words(gone)}, {_CHANGED}: begun anew")
+                        session.reset()
                     if now - self._told >= 0.999 * self.every:
                         self._tell(session, now)
                     if now - self._saved >= SAVE_EVERY:
@@ -219,9 +225,7 @@ class ArmProcess:
                 self.note(f"{path} was saved at a time that is still to come, nobody knows how old it is: begun anew")
                 return None
             if ago > SESSION:
-                self.note(
-                    f"{path} was saved {in_words(ago)} ago, and offsets and friction change within hours: begun anew"
-                )
+                self.note(f"{path} was saved {in_words(ago)} ago, {_CHANGED}: begun anew")
                 return None
             method, every = self.settings.method, self.every
             identifier = OnlineIdentifier.restore(path, self.arm, method, profile, known=known, every=every)

@@ -39,15 +39,16 @@ class Plausibility:
     Args:
         arm: the arm. name: what the stream is called in messages. steadied: whether its velocities are told by
             positions, too, so that nobody need be advised to (`devices.Steadied`).
+        profiled: whether the stream has a profile, beside which no velocities are steadied.
 
     Attributes:
         doubt: the message of the last check that failed, one sentence; None: nothing is in doubt.
     """
 
-    def __init__(self, arm: Arm, name: str, steadied: bool = False) -> None:
+    def __init__(self, arm: Arm, name: str, steadied: bool = False, profiled: bool = False) -> None:
         # what is attached is a payload to the checks
         self._arm, self._name = replace(arm, attached=None), name
-        self._advises = not (steadied or arm.motor_torque)
+        self._advises, self._profiled = not (steadied or arm.motor_torque), profiled
         self.reset()
 
     def reset(self) -> None:
@@ -127,7 +128,7 @@ class Plausibility:
             self._wrong = scale if scale is not None and scale.is_wrong else self._wrong
         else:
             if self._advises and not self._advised:
-                self._advice = _advice(log)
+                self._advice = _advice(log, self._profiled)
             if before is not None and self._speaks_against_the_doubt(log):
                 self.doubt = self._wrong = None
         return (self.doubt is None) != (before is None)
@@ -142,15 +143,19 @@ class Plausibility:
         return scale is not None and scale.contradicts(self._wrong)
 
 
-def _advice(log: Recording) -> str | None:
-    """To steady the velocities, if those of the last seconds are noisier than those of most robots."""
+def _advice(log: Recording, profiled: bool) -> str | None:
+    """To steady the velocities, if those of the last seconds are noisier than those of most robots.
+
+    profiled: there is a profile, which is learned from velocities as they come.
+    """
     last = log.between(log.t[-1] - _ROUGH_SECONDS, log.t[-1])
     if len(last) < 3:
         return None
     noise = float(np.mean((steadied(last).dq - last.dq) ** 2, axis=0).max())
     if noise / last.rate <= _ROUGH:
         return None
+    how = "give a tare in place of the profile, and steady them" if profiled else "steady them"
     return (
         f"velocities are off by {1e3 * np.sqrt(noise):.0f} mrad/s from what the positions around tell, too: a sound "
-        "stream may be doubted; steady them (--steady of armload live, steady of a service or node)"
+        f"stream may be doubted; {how} (--steady of armload live, steady of a service or node)"
     )

@@ -91,7 +91,7 @@ class Session:
         self.error: Exception | None = None
         self._orders: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._recent = Recent(arm.n)
-        self._plausibility = Plausibility(arm, source.name, isinstance(source, Steadied))
+        self._plausibility = Plausibility(arm, source.name, isinstance(source, Steadied), profile is not None)
         self._said: tuple[str, ...] = ()  # what the source notes, and has been said
         self._thread: threading.Thread | None = None
         self._stop = False

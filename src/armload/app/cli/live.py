@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import time
 from typing import TYPE_CHECKING
 
@@ -20,11 +19,12 @@ from armload.app.cli.arguments import (
     file_name,
     output_file,
 )
+from armload.app.cli.learning import learn_from
 from armload.app.cli.named import arm_of, payload_named, robot_of
 from armload.app.cli.named_logs import columns_for, columns_of, read_logs
-from armload.app.cli.outputs import check_output, contents_of
+from armload.app.cli.outputs import check_output
 from armload.app.cli.printing import notes_aside, print_note
-from armload.errors import ArmloadError, IdentificationError, ModelError, UsageError
+from armload.errors import ArmloadError, UsageError
 from armload.runtime.interruption import ended_by_sigterm, held_back
 
 if TYPE_CHECKING:
@@ -206,7 +206,7 @@ def run(options: argparse.Namespace) -> int | None:
         finally:
             session.close()
             if options.learn and options.profile is not None and session.error is None:
-                _learn(session, options.profile)
+                learn_from(session, options.profile)
 
 
 def without_effect(options: argparse.Namespace) -> list[str]:
@@ -256,27 +256,6 @@ def _arm_of(options: argparse.Namespace) -> Arm:
     from armload.identification import with_tool
 
     return with_tool(arm, payload_named(options.tool, arm))
-
-
-def _learn(session, path: str) -> None:
-    """Add what the stream has shown of the empty arm to a profile's file."""
-    from armload.posterior import load_profile, save_profile
-
-    name, before = session.source.name, b"not read yet"
-    if not os.path.exists(name):  # else of a log, which has a name of its own
-        name = f"{name} {time.strftime('%Y-%m-%d %H:%M')}"
-    while before != (before := contents_of(path)):  # another program may add to it, also meanwhile
-        try:
-            now = load_profile(path) if os.path.exists(path) else None
-            profile = session.identifier.learned(name, now)
-        except (IdentificationError, ModelError) as error:
-            print_note(f"{path} is as it was: {error}")
-            return
-        if profile is None:
-            print_note(f"{path} is as it was: the stream showed no 20 s of the empty arm as the profile knows it")
-            return
-    save_profile(profile, path)
-    print_note(f"{path}: learned {profile.sessions[-1].duration:.0f} s of the empty arm")
 
 
 def _warn(text: str) -> None:

@@ -6,7 +6,7 @@ import argparse
 import glob
 import os
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +21,11 @@ _BUILT_IN = {"franka-hand", "loadings", "none", "nothing", "rated", "sim", "taie
 _POSITIONAL = {"log", "logs", "motion", "path", "paths", "result", "source", "sources"}
 _OF_FOLDERS = ("metadata.yaml", "provenance.json")  # of a ROS 2 bag, and of a data set, beside their logs
 _META = "meta"  # of a LeRobot data set: all that is said of its episodes
+_WRITES = 15.0  # [s] another command is waited for that writes the same file: megabytes, on a busy disk
+
+
+class ChangedError(UsageError):
+    """A file that is to be replaced is another one than was read."""
 
 
 class _Input(NamedTuple):
@@ -96,23 +101,37 @@ def check_output(option: str, path: str) -> None:
 
 
 def contents_of(path: str) -> bytes | None:
-    """What tells a file's contents from any others: their SHA-256; None: it is not there."""
+    """What tells a file's contents from any others: their SHA-256; None: it is not there, or no regular file."""
     import hashlib
 
+    from armload.runtime.regular import check_regular
+
     try:
+        check_regular(path)
         return hashlib.sha256(Path(path).read_bytes()).digest()
     except OSError:
         return None
 
 
-def check_unchanged(option: str, path: str, before: bytes | None) -> None:
-    """See that a file which is to be replaced is as it was when it was read.
+@contextmanager
+def replacing_unchanged(option: str, path: str, before: bytes | None) -> Iterator[None]:
+    """Within, a file that is to be replaced is as it was when it was read, and no other command is in such a block.
 
     Raises:
-        UsageError: another program has changed it meanwhile.
+        UsageError: another program has changed it meanwhile, or is writing it and does not end.
     """
-    if contents_of(path) != before:
-        raise UsageError(f"{option} {path} was changed by another program meanwhile: it is left so; ask once more")
+    from armload.runtime.atomic import kept_alone  # with tempfile: only for who writes
+
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(kept_alone(os.path.realpath(path), _WRITES))
+        except BlockingIOError:
+            raise UsageError(f"{option} {path} is being written by another program: ask once more") from None
+        if contents_of(path) != before:
+            raise ChangedError(
+                f"{option} {path} was changed by another program meanwhile: it is left so; ask once more"
+            )
+        yield
 
 
 def _hinders(path: str) -> str:

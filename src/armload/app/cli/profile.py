@@ -19,7 +19,7 @@ from armload.app.cli.arguments import (
 from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, payload_named
 from armload.app.cli.named_logs import read_logs
-from armload.app.cli.outputs import check_unchanged, contents_of
+from armload.app.cli.outputs import contents_of, replacing_unchanged
 from armload.app.cli.printing import print_json, print_note, working
 from armload.app.cli.profile_text import fields_of, in_time, of_motors, print_profile
 from armload.errors import UsageError
@@ -130,8 +130,8 @@ def run(options: argparse.Namespace) -> None:
                 known=known,
                 progress=lambda done, total: say(f"learning: {done} of {total} logs"),
             )
-    check_unchanged("--out", options.out, before)
-    save_profile(profile, options.out)
+    with replacing_unchanged("--out", options.out, before):
+        save_profile(profile, options.out)
     for note in of_readers(*logs):
         print_note(note)
     profile = in_time(profile)
