@@ -69,7 +69,7 @@ def with_tool(arm: Arm, tool: InertialParameters | Payload) -> Arm:
     if isinstance(tool, Payload) and not tool.inertia_known:
         std = np.maximum(*any_inertia(known)) / Z95
         error += Inexact(np.diag(np.r_[np.zeros(4), std**2]))
-    return arm.with_payload(known, error)
+    return arm.with_payload(known, None if error.is_none else error)
 
 
 def allowing_for(
@@ -84,6 +84,8 @@ def allowing_for(
         known: of the payload, apart from the log. log_only: what the log says without it. quick: the nearest body is
             found in bounded time.
     """
+    if not np.any(error.covariance):
+        return estimate
     if known is None or log_only is None or not known.which.any():
         return replace(estimate, covariance=estimate.covariance + error.covariance)
     alone = log_only[0], log_only[1] + error.covariance

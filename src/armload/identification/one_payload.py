@@ -39,27 +39,22 @@ class Question:
     asked: Asked
     notes: tuple[str, ...]
 
+    @property
+    def tared(self) -> bool:
+        """Whether the arm is known from elsewhere, with whatever was mounted there."""
+        return self.tare is not None or self.asked.profile is not None
+
 
 def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) -> Identification:
     """The answer for a log, or the part of one, throughout which the payload is the same."""
-    tare, mounted, asked, notes = question.tare, question.mounted, question.asked, question.notes
-    tared = tare is not None or asked.profile is not None
-    bare = "arm" if arm.attached is None else "tool"  # that of a description with a hand, say
-    without = bare if asked.profile is None else "profile"
+    tare, mounted, asked = question.tare, question.mounted, question.asked
     if mounted is None:
-        relative_to = without if tare is None else "tare"
-        found = found_in(recording, arm, tare, asked)
-        if arm.attached_error is not None and not tared:  # else it is in both logs, or in the profile's
-            found, notes = found.with_error(arm.attached_error), (*notes, *arm.attached_error.notes)
-        return answered(found, arm, recording, tared, relative_to, notes)
+        return _beyond_what_is_on(recording, arm, question)
     known, error = mounted_on(arm, mounted)
     unsure = known if isinstance(mounted, Payload) and not mounted.inertia_known else None
-    notes = (*notes, *error.notes)
-    if tare is None and asked.profile is None:
-        arm = arm.with_payload(known, error)
-        assert arm.attached_error is not None
-        found = found_in(recording, arm, None, asked).with_error(arm.attached_error)
-        return answered(found, arm, recording, False, "tool", notes, unsure=unsure)
+    if not question.tared:
+        return _beyond_what_is_on(recording, arm.with_payload(known, error), question, unsure)
+    notes = (*question.notes, *error.notes)
     carried, sure = _carries(arm, known, tare, asked.profile)
     before = "at the tare" if tare is not None else "in the profile's logs"
     since = "after the tare" if tare is not None else "after the profile's logs"
@@ -79,10 +74,23 @@ def answer_of_one_payload(recording: Recording, arm: Arm, question: Question) ->
                 "small; leave the tool out"
             )
     if sure:
-        return answered(found, arm, recording, tared, relative_to, (*notes, note), unsure=unsure)
+        return answered(found, arm, recording, True, relative_to, (*notes, note), unsure=unsure)
     who = "tare" if tare is not None else "profile"
     note = f"it seems that {note}; the {who} does not tell for sure, the intervals hold the other case, too"
-    return answered(found, arm, recording, tared, relative_to, (*notes, note), otherwise, unsure)
+    return answered(found, arm, recording, True, relative_to, (*notes, note), otherwise, unsure)
+
+
+def _beyond_what_is_on(
+    recording: Recording, arm: Arm, question: Question, unsure: InertialParameters | None = None
+) -> Identification:
+    """What is held beyond the arm as it is given. unsure: a tool that is part of it, whose own inertia is not known."""
+    tare, asked, notes = question.tare, question.asked, question.notes
+    found = found_in(recording, arm, tare, asked)
+    if arm.attached_error is not None and not question.tared:  # else it is in both logs, or in the profile's
+        found, notes = found.with_error(arm.attached_error), (*notes, *arm.attached_error.notes)
+    bare = "arm" if arm.attached is None else "tool"  # that of a description with a hand, say
+    relative_to = "tare" if tare is not None else "profile" if asked.profile is not None else bare
+    return answered(found, arm, recording, question.tared, relative_to, notes, unsure=unsure)
 
 
 def known_of(

@@ -22,6 +22,11 @@ class Inexact:
     calibrated: bool = True
     notes: tuple[str, ...] = ()
 
+    @property
+    def is_none(self) -> bool:
+        """Whether the body is exactly known, and there is nothing to say."""
+        return self.calibrated and not self.notes and not np.any(self.covariance)
+
     def __add__(self, other: Inexact) -> Inexact:
         """Of two bodies together, whose errors have nothing to do with each other."""
         covariance = self.covariance + other.covariance
