@@ -27,7 +27,8 @@ split = split_payloads(dataset, seed=1)
 ensemble = BaggingEnsemble("tree", members=5, seed=1).fit(dataset.X[split.train], dataset.y[split.train])
 path = folder / "trees.safetensors"
 error = held_out_error(ensemble, dataset, split.test)  # what its error bars rest on
-save_model(path, ensemble, arm=panda, motion=motion, dataset_hash=dataset.hash, error_std=error)
+about = {"dataset_hash": dataset.hash, "payloads": dataset.payload[split.train]}  # what it learned from
+save_model(path, ensemble, arm=panda, motion=motion, error_std=error, **about)
 
 # a loading that was held out, on the motion of the training
 unseen = loadings[dataset.payload[split.test[0]]]

@@ -308,6 +308,27 @@ def test_report_of_a_data_set_takes_held_out_payloads_only(call, work):
     assert "by payload with seed 5" in page
 
 
+@pytest.mark.parametrize("split", [("--seed", "6"), ("--seed", "5", "--split", "row")])
+def test_a_model_that_learned_from_payloads_held_out_of_a_report_is_refused(work, call, tmp_path, split):
+    model = tmp_path / "other.safetensors"
+    call("train", "--dataset", work / "data", "--members", "1", *split, "--out", model)
+    argv = ("report", "--dataset", work / "data", "--seed", "5", "--out", tmp_path / "r.html")
+    captured = call(*argv, "--model", model, code=2)
+    assert captured.out == ""
+    assert f"the model {model} learned from" in captured.err
+    assert not (tmp_path / "r.html").exists()
+
+
+@pytest.mark.parametrize("name", ["trees", "map"])
+def test_two_rows_of_a_report_never_have_one_name(work, call, tmp_path, name):
+    shutil.copy(work / "trees.safetensors", tmp_path / f"{name}.safetensors")
+    models = (work / "trees.safetensors", tmp_path / f"{name}.safetensors")
+    argv = ("report", "--dataset", work / "data", "--seed", "5", "--out", tmp_path / "r.html")
+    captured = call(*argv, "--model", *models, code=2)
+    assert captured.out == ""
+    assert f"another row is called {name!r}" in captured.err
+
+
 @pytest.mark.parametrize(
     ("argv", "named"),
     [

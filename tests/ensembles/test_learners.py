@@ -186,6 +186,11 @@ def test_unknown_settings_are_named():
         BaggingEnsemble("tree", members=0).fit(X, y)
     with pytest.raises(ModelError, match="max_epochs is 0"):
         BaggingEnsemble(NetworkLearner(max_epochs=0)).fit(X, y)
+    for setting, wrong in (("hidden", 2.5), ("batch", "8"), ("learning_rate", -1e-3), ("learning_rate", float("nan"))):
+        with pytest.raises(ModelError, match=f"{setting} is {wrong!r}"):
+            BaggingEnsemble(NetworkLearner(max_epochs=1, **{setting: wrong})).fit(X, y)
+    with pytest.raises(ModelError, match="kinds of a mixed ensemble are none"):
+        MixedEnsemble(()).fit(X, y)
     with pytest.raises(ModelError, match="expects the ten of phi"):
         TwoStage("tree").fit(X, y[:, :4])
     for setting, wrong in (("members", 2.5), ("members", "3"), ("seed", None), ("hold_out", 1.0), ("hold_out", -0.1)):

@@ -287,6 +287,21 @@ def test_a_model_of_several_motions_takes_each_and_one_of_none_takes_any(panda, 
     free.check(panda, log_of(third, panda))
 
 
+def test_a_model_is_shown_on_payloads_of_its_own_data_set_only_where_they_are_new_to_it(panda, log, tmp_path):
+    X = rows_of(log)[::4]
+    fitted, keep = BaggingEnsemble(members=2).fit(X, X[:, :10]), {"arm": panda, "motion": None, "dataset_hash": "own"}
+    model = save_model(tmp_path / "a", fitted, payloads=[3, 1, 3], **keep)
+    assert model.payloads == (1, 3)
+    model.check_new("own", [0, 2, 2])
+    model.check_new("another", [1])
+    with pytest.raises(ModelError, match="learned from 1 of the 2 payloads that are to be new to it"):
+        model.check_new("own", [0, 1, 1])
+    silent = save_model(tmp_path / "b", fitted, **keep)
+    silent.check_new("another", [1])
+    with pytest.raises(ModelError, match="does not say from which of its payloads"):
+        silent.check_new("own", [0])
+
+
 def test_rows_of_another_width_are_refused(tree):
     with pytest.raises(ModelError, match=r"expects 22 columns \(t, q1 … tau7\)"):
         tree[1].predict(np.zeros((3, 21)))

@@ -10,7 +10,7 @@ from armload.app.cli import main
 from armload.errors import ArmloadError, IdentificationError
 from armload.estimators import Estimate, Identifier
 from armload.identification import METHODS
-from armload.lab import load_cells
+from armload.lab import load_cells, save_cell
 from armload.lab.benchmark import ALL, QUICK, Size, default_names, gather, left_out, run_benchmark, write_results
 from armload.lab.benchmark.benchmark_results import summary_json
 from armload.lab.benchmark.benchmark_run import cell_name, measure
@@ -358,6 +358,13 @@ def test_nothing_finished_is_nothing_written(tmp_path):
     with pytest.raises(ArmloadError, match="nothing is measured"):
         write_results(cells, size, tmp_path / "a.json", tmp_path / "a.md", tmp_path / "a.html")
     assert not (tmp_path / "a.json").exists()
+
+
+def test_cells_of_another_experiment_in_the_folder_are_passed_over(tmp_path):
+    save_cell(tmp_path, {"name": "tree-1stage-raw-row-ideal-s0", "key": "of the study", "spec": {}})
+    save_cell(tmp_path, {"name": "no key"})
+    size = replace(QUICK, populations=("untared",), methods=("rls-filter",))
+    assert run_benchmark(size, tmp_path, until=-1.0) == {}
 
 
 def test_the_prior_is_the_same_every_time(panda):

@@ -17,7 +17,13 @@ def table(payloads=20, motions=5, worlds=4, rows=3):
     """A data set of all combinations, with nothing in it but the identities."""
     w, m, p, _ = (x.ravel().astype(np.int32) for x in np.indices((worlds, motions, payloads, rows)))
     run = np.repeat(np.arange(len(p) // rows, dtype=np.int32), rows)
-    return Dataset(np.zeros((len(p), 22)), np.zeros((len(p), 10)), run, p, m, w, {"sha256": "0"}, Path("none"))
+    made_from = {
+        "payloads": [{"phi": [float(k)]} for k in range(payloads)],
+        "motions": [{"fingerprint": f"motion {k}"} for k in range(motions)],
+        "worlds": [{"fingerprint": f"world {k}"} for k in range(worlds)],
+        "sha256": "0",
+    }
+    return Dataset(np.zeros((len(p), 22)), np.zeros((len(p), 10)), run, p, m, w, made_from, Path("none"))
 
 
 fractions = st.tuples(*[st.integers(0, 10)] * 3).filter(any).map(lambda x: tuple(np.array(x) / sum(x)))
@@ -41,6 +47,16 @@ def test_a_group_is_never_in_two_parts(split, seed):
     group = getattr(data, GROUPED[split])
     seen = [set(group[part]) for part in split(data, seed)]
     assert sum(map(len, seen)) == len(set(group))
+
+
+@pytest.mark.parametrize("split", GROUPED)
+def test_what_is_listed_twice_is_never_in_two_parts(split):
+    data, what = table(payloads=12, motions=12, worlds=12, rows=1), GROUPED[split]
+    listed = data.provenance[f"{what}s"]
+    listed[6:] = listed[:6]
+    for seed in range(20):
+        seen = [set(getattr(data, what)[part] % 6) for part in split(data, seed)]
+        assert sum(map(len, seen)) == 6
 
 
 def test_rows_of_one_payload_do_fall_into_all_parts_when_split_by_row():

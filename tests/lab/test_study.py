@@ -1,5 +1,6 @@
 """The study's machinery: cells that are measured once, protocols with known errors, a quick run that resumes."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from armload.lab.study.readings import reading_specs
 from armload.lab.study.rivals import rivals
 from armload.lab.study.study_page import pages, summary_json, write_pages
 from armload.lab.study.study_tables import LEAST_SQUARES
-from armload.recording import Recording
+from armload.recording import Recording, write_recording
 
 ROOT = Path(__file__).resolve().parents[2]
 # every cell of the plan, each as cheap as can be
@@ -260,6 +261,33 @@ def test_the_committed_page_and_summary_are_what_the_committed_cells_say(tmp_pat
     committed = pages(ROOT / "docs" / "paper.md")
     for name, path in write_pages(cells, claims, tmp_path / "paper.md").items():
         assert path.read_text(encoding="utf-8") == committed[name].read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("log", ["a.csv", "b.csv"])
+def test_a_cell_is_measured_again_on_another_real_log_and_kept_where_there_is_none(tmp_path, monkeypatch, log):
+    (tmp_path / "a.csv").write_text("the study's own")
+    (tmp_path / "b.csv").write_text("another")
+    monkeypatch.setattr(study_run, "_OWN_LOG", hashlib.sha256((tmp_path / "a.csv").read_bytes()).hexdigest())
+    spec, done = Spec("benchmark", "rls"), tmp_path / "cells"
+
+    def key(real_log):
+        return study_run.cell_keys(Basis(tmp_path, SMALL, real_log), done)(spec)
+
+    without, on_log = key(None), key(tmp_path / log)
+    assert len({without, key(tmp_path / "a.csv"), key(tmp_path / "b.csv")}) == 3
+    assert key(tmp_path / "a.csv") == spec.key(Basis(tmp_path, SMALL).fingerprint)  # as that of the committed cells
+    save_cell(done, {"name": spec.name, "key": on_log})
+    assert key(None) == (on_log if log == "a.csv" else without)
+    assert key(tmp_path / log) == on_log
+    with pytest.raises(DatasetError, match="cannot be read"):
+        key(tmp_path / "gone.csv")
+
+
+def test_a_real_log_that_is_too_short_is_named_with_what_is_expected(tmp_path, analytic_log, panda):
+    path = tmp_path / "short.csv"
+    write_recording(path, analytic_log(panda, duration=6.0, rate=50.0))
+    with pytest.raises(DatasetError, match=r"short.csv lasts 6.0 s: expected at least 20 s"):
+        Basis(tmp_path, SMALL, path)._on_real_log()
 
 
 def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp_path, capsys):

@@ -419,6 +419,14 @@ def test_records_read_back_as_they_were_written(synthetic, tmp_path):
     back = Records.load(synthetic.save(tmp_path / "records.npz"))
     assert np.array_equal(back.information, synthetic.information)
     assert np.array_equal(back.group, synthetic.group)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.999])
+def test_records_cut_short_are_named_with_what_to_do(synthetic, tmp_path, share):
+    whole = synthetic.save(tmp_path / "records.npz").read_bytes()
+    (tmp_path / "bad.npz").write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(ModelError, match=r"bad\.npz holds no records of episodes .*: delete it and make it again"):
+        Records.load(tmp_path / "bad.npz")
     (tmp_path / "bad.npz").write_text("no")
     with pytest.raises(ModelError, match="holds no records"):
         Records.load(tmp_path / "bad.npz")

@@ -49,6 +49,7 @@ def save_model(
     arm: Arm,
     motion: Motion | MotionFingerprint | Sequence[Motion | MotionFingerprint] | None,
     dataset_hash: str,
+    payloads: ArrayLike | None = None,
     frame: str | None = None,
     error_std: ArrayLike | None = None,
     notes: str = "",
@@ -62,6 +63,8 @@ def save_model(
         motion: the motion, or motions, of the training data, or their fingerprints. None: the model is meant for any
             motion, and no recording is refused for its motion.
         dataset_hash: `Dataset.hash` of the training data.
+        payloads: which payloads of that data set any training or validation row is of (`Dataset.payload` of these
+            rows). None: unknown; the model is then shown on none of its runs (`LearnedModel.check_new`).
         frame: the payload frame; must be the arm's. Default: the arm's.
         error_std: (10,) root-mean-square error on payloads held out from training (`held_out_error`). None: unknown;
             the model then gives no interval but that of its training payloads.
@@ -93,6 +96,7 @@ def save_model(
         "frame": arm.frame,
         "motions": [m.to_dict() for m in prints],
         "dataset_hash": dataset_hash,
+        "payloads": None if payloads is None else np.unique(np.asarray(payloads, dtype=int)).tolist(),
         "features": column_names(arm.n),
         "phi_mean": model.y_mean_.tolist(),
         "phi_std": model.y_std_.tolist(),
@@ -136,6 +140,7 @@ def _model(path: Path, tensors: dict[str, NDArray], header: dict[str, Any]) -> L
         frame=header["frame"],
         motions=tuple(MotionFingerprint.from_dict(m) for m in header["motions"]),
         dataset_hash=header["dataset_hash"],
+        payloads=None if header.get("payloads") is None else tuple(map(int, header["payloads"])),
         phi_mean=np.array(header["phi_mean"], dtype=float),
         phi_std=np.array(header["phi_std"], dtype=float),
         error_std=None if header["error_std"] is None else np.array(header["error_std"], dtype=float),

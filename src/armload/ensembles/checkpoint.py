@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.errors import ModelError
+from armload.errors import ModelError, one_line
 from armload.runtime.atomic import replacing
 
 
@@ -75,8 +74,9 @@ class TrainingState:
             training = (w, first, second, np.float32(a["count"]))
             losses = list(a["losses"])
             state = cls(int(a["epoch"]), a["active"], training, best, a["best_loss"], a["epochs"], losses)
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise ModelError(f"{path} is not a training checkpoint ({error}): delete it to start anew") from None
+        except Exception as error:  # a damaged archive can fail anywhere between zip, zlib and the array header
+            why = one_line(error)
+            raise ModelError(f"{path} is not a training checkpoint ({why}): delete it to start anew") from None
         if not same:
             raise ModelError(
                 f"the checkpoint {path} belongs to another training: expected the same data, settings and seed; "

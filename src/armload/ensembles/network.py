@@ -8,6 +8,7 @@ import logging
 import os
 import time
 from functools import cache
+from numbers import Integral
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,8 +69,11 @@ class NetworkLearner(Learner):
                 training that diverged.
         """
         for name in ("hidden", "batch", "max_epochs", "patience"):
-            if getattr(self, name) < 1:
-                raise ModelError(f"{name} is {getattr(self, name)}: expected a whole number of at least 1")
+            given = getattr(self, name)
+            if not isinstance(given, Integral) or given < 1:
+                raise ModelError(f"{name} is {given!r}: expected a whole number of at least 1")
+        if not self.learning_rate > 0.0:
+            raise ModelError(f"learning_rate is {self.learning_rate!r}: expected a number above 0")
         data = _Rows.of(bag)
         key = self._key(bag) if checkpoint else ""
         state = TrainingState.load(checkpoint, key) if checkpoint and checkpoint.exists() else self._start(data)

@@ -91,6 +91,8 @@ class MixedEnsemble(Ensemble):
     def _train(
         self, rows: Rows, validation: Rows | None, progress: bool | Report | None, checkpoint: Path | None
     ) -> None:
+        if not self.kinds:
+            raise ModelError("the kinds of a mixed ensemble are none: expected at least one, such as 'tree'")
         self.parts_ = [
             BaggingEnsemble(kind, self.members, self.seed, self.bootstrap, self.scale, self.hold_out).fit(
                 *rows, *(validation or ()), progress=progress, checkpoint=_part_checkpoint(checkpoint, f"part{k}")

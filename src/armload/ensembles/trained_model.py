@@ -24,7 +24,8 @@ class LearnedModel:
     compiled: the members. kind: such as "tree" or "two-stage network".
     arm_name, arm_fingerprint, joint_names, frame: the arm it was trained on, and what phi is about.
     motions: fingerprints of the motions it was trained on; empty if it is not tied to any.
-    dataset_hash: of the training data. phi_mean, phi_std: (10,) of the training payloads, by rows.
+    dataset_hash: of the training data. payloads: which of its payloads any training or validation row is of, as
+    numbers in the data set's list; None: unknown. phi_mean, phi_std: (10,) of the training payloads, by rows.
     error_std: (10,) root-mean-square error of a whole run's estimate on payloads held out from training; None: unknown.
     settings, epochs, versions, notes: how it was trained. source: the file.
     """
@@ -37,6 +38,7 @@ class LearnedModel:
     frame: str
     motions: tuple[MotionFingerprint, ...]
     dataset_hash: str
+    payloads: tuple[int, ...] | None
     phi_mean: NDArray[np.float64]
     phi_std: NDArray[np.float64]
     error_std: NDArray[np.float64] | None
@@ -102,6 +104,30 @@ class LearnedModel:
                 f"{recording.source} ({recording.duration:.2f} s) does not follow a motion {model} was trained on "
                 f"({known}; rms distance {away:.3g} rad): run "
                 "such a motion from its start, or use least squares, which takes any"
+            )
+
+    def check_new(self, dataset_hash: str, payloads: ArrayLike) -> None:
+        """Whether these payloads of a data set are new to the model; of another data set than its own they are.
+
+        Args:
+            dataset_hash: `Dataset.hash`. payloads: numbers in that data set's list.
+
+        Raises:
+            ModelError: one is among those it learned from, or it is unknown which these are.
+        """
+        if dataset_hash != self.dataset_hash:
+            return
+        if self.payloads is None:
+            raise ModelError(
+                f"the model {self.source} learned from this data set and does not say from which of its payloads: its "
+                "errors on them may be of what it knows; train it again"
+            )
+        asked = np.unique(np.asarray(payloads, dtype=int))
+        known = np.intersect1d(asked, self.payloads)
+        if len(known):
+            raise ModelError(
+                f"the model {self.source} learned from {len(known)} of the {len(asked)} payloads that are to be new to "
+                "it: expected one trained with the same split, by payload, and the same seed"
             )
 
     def __str__(self) -> str:

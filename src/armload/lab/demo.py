@@ -190,7 +190,8 @@ def _train(
         ensemble.fit(*data, progress=progress)
         path = folder / f"{name.replace(', ', '-').replace(' ', '-')}.safetensors"
         error = held_out_error(ensemble, dataset, split.validation)
-        model = save_model(path, ensemble, arm=robot, motion=motion, dataset_hash=dataset.hash, error_std=error)
+        about = {"dataset_hash": dataset.hash, "payloads": dataset.payload[np.r_[split.train, split.validation]]}
+        model = save_model(path, ensemble, arm=robot, motion=motion, error_std=error, **about)
         out[name] = lambda _, model=model: LearnedIdentifier(model, robot)  # another motion's tare is of no use to it
     return out
 

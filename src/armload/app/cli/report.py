@@ -26,8 +26,10 @@ from armload.errors import UsageError
 
 if TYPE_CHECKING:
     from armload.arms import Arm
+    from armload.ensembles import LearnedModel
     from armload.estimators import Identifier
     from armload.lab.report import Section
+    from armload.posterior import HybridModel
     from armload.recording import Recording
 
 _POINTS = 40  # estimates drawn along the log
@@ -40,8 +42,8 @@ examples:
   armload report --dataset data/paper --model trees.safetensors --out test.html
 
 With --truth the report shows errors too, beside two baselines. With --dataset it shows them for runs with payloads that
-`armload train` held out for testing (with the same --seed). A trained ensemble answers for all that the arm holds, as
-in its training: the tare is not subtracted from it.
+`armload train` held out for testing (with the same --seed); a model that learned from one of them is refused. A trained
+ensemble answers for all that the arm holds, as in its training: the tare is not subtracted from it.
 """
 
 
@@ -105,7 +107,8 @@ def _of_log(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[li
     for note in found.notes:
         print_note(note)
     answer = answer_section(found, truth)
-    methods, title = _methods(arm, log, options.model), f"{Path(options.log).name} on {arm.name}"
+    models = _models(arm, log, options.model)
+    methods, title = _methods(arm, models), f"{Path(options.log).name} on {arm.name}"
     about = f"The log `{options.log}`" + (
         f", relative to what was mounted in the tare `{options.tare}`." if tare else ", without a tare."
     )
@@ -128,6 +131,7 @@ def _of_log(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[li
 def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[list[Section], str]:
     import numpy as np
 
+    from armload.ensembles import LearnedModel
     from armload.lab.dataset import open_dataset, split_payloads
     from armload.lab.evaluation import EvaluationRun, compare
     from armload.lab.report import default_report
@@ -140,8 +144,12 @@ def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tupl
         EvaluationRun(dataset.recording(k), dataset.truth(k), f"{names[dataset.payload[dataset.run == k][0]]}, run {k}")
         for k in held_out
     ]
+    models = _models(arm, runs[0].recording, options.model)
+    for model in models.values():
+        if isinstance(model, LearnedModel):
+            model.check_new(dataset.hash, dataset.payload[np.isin(dataset.run, held_out)])
     comparison = compare(
-        _methods(arm, runs[0].recording, options.model),
+        _methods(arm, models),
         runs,
         training=[dataset.truth(k) for k in np.unique(dataset.run[split.train])],
         split=f"by payload with seed {options.seed}; the first {len(runs)} test runs of {options.dataset}",
@@ -151,19 +159,45 @@ def _of_dataset(options: argparse.Namespace, say: Callable[[str], None]) -> tupl
     return default_report(comparison, runs, arm, introduction=about), f"{options.dataset} on {arm.name}"
 
 
-def _methods(arm: Arm, log: Recording, models: list[str]) -> dict[str, Callable[[Recording | None], Identifier]]:
-    """Every method by name, each a function of the tare."""
-    from armload.ensembles import LearnedIdentifier, load_model
-    from armload.identification import METHODS, default_for
-    from armload.posterior import HybridIdentifier, HybridModel
+def _models(arm: Arm, log: Recording, paths: list[str]) -> dict[str, LearnedModel | HybridModel]:
+    """The trained models by the names of their rows, each of which may answer for the arm and the log."""
+    from armload.ensembles import load_model
+    from armload.posterior import HybridModel
 
-    names = dict.fromkeys((default_for(arm), "map", "rls", "rls-filter"))
-    methods: dict[str, Callable[[Recording | None], Identifier]] = {n: partial(METHODS[n].make, arm) for n in names}
-    for path in models:
+    models: dict[str, LearnedModel | HybridModel] = {}
+    for path in paths:
+        name = Path(path).stem
+        if name in models or name in _names(arm):
+            raise UsageError(f"--model {path}: another row is called {name!r}, too: give the file another name")
         if HybridModel.wrote(path):
-            methods[Path(path).stem] = partial(HybridIdentifier, arm, model=HybridModel.load(path))
-            continue
-        model = load_model(path)
-        model.check(arm, log)
-        methods[Path(path).stem] = lambda _, model=model: LearnedIdentifier(model, arm)
+            models[name] = HybridModel.load(path)
+        else:
+            models[name] = learned = load_model(path)
+            learned.check(arm, log)
+    return models
+
+
+def _names(arm: Arm) -> tuple[str, ...]:
+    """Methods of the catalogue that are shown."""
+    from armload.identification import default_for
+
+    return tuple(dict.fromkeys((default_for(arm), "map", "rls", "rls-filter")))
+
+
+def _methods(
+    arm: Arm, models: dict[str, LearnedModel | HybridModel]
+) -> dict[str, Callable[[Recording | None], Identifier]]:
+    """Every method by name, each a function of the tare."""
+    from armload.ensembles import LearnedIdentifier, LearnedModel
+    from armload.identification import METHODS
+    from armload.posterior import HybridIdentifier
+
+    methods: dict[str, Callable[[Recording | None], Identifier]] = {
+        name: partial(METHODS[name].make, arm) for name in _names(arm)
+    }
+    for name, model in models.items():
+        if isinstance(model, LearnedModel):
+            methods[name] = lambda _, model=model: LearnedIdentifier(model, arm)
+        else:
+            methods[name] = partial(HybridIdentifier, arm, model=model)
     return methods

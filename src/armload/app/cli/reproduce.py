@@ -19,7 +19,8 @@ examples:
   armload reproduce taie2024 --jobs 2           (two cells at once: about half the hours, the same numbers)
   armload reproduce taie2024 --hours 3
 
-Each method, training and split is a cell with a file of its own in --results; finished cells are not measured again.
+Each method, training and split is a cell with a file of its own in --results; finished cells are not measured again,
+but on another --real-log.
 The page, its appendix, the summary and the report are written from the cells there are; what is missing is named.
 """
 

@@ -161,6 +161,8 @@ def settle(options: argparse.Namespace) -> None:
 
 def _run_ensemble(options: argparse.Namespace) -> None:
     """Train on both splits, print the errors on what was held out, save the model of the chosen split."""
+    import numpy as np
+
     from armload.ensembles import save_model
     from armload.lab.dataset import open_dataset, split_payloads, split_rows
     from armload.lab.evaluation import held_out_error
@@ -185,6 +187,7 @@ def _run_ensemble(options: argparse.Namespace) -> None:
         arm=arm,
         motion=motions,
         dataset_hash=dataset.hash,
+        payloads=dataset.payload[np.concatenate([split.train, split.validation])],
         error_std=error_std,
         notes=f"split by {options.split}",
     )

@@ -24,6 +24,7 @@ from armload.lab.experiment import Cells, Task, listed, run_tasks
 FORMAT = 1  # of a cell; a change makes every cell unfinished
 TIMES = (0.02, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
 FIRST_SEED = 900_001  # of the episodes: nothing is trained on it or on those that follow
+_IN_EVERY_CELL = {"population", "seed", "row"}
 _REPEATED = 3  # arms and payloads whose repeatability is measured, at most
 
 
@@ -119,11 +120,12 @@ def run_benchmark(
         jobs, cluster, until, say: see `run_tasks`.
     """
     robot = arm(size.robot)
-    cells = load_cells(folder, [])  # `run_tasks` says which are damaged
+    # of other experiments there may be some, too; which are damaged `run_tasks` says
+    cells = {name: cell for name, cell in load_cells(folder, []).items() if cell.keys() >= _IN_EVERY_CELL}
     say("checking what is finished")
     wanted = {name: rows_for(population(name), size.methods) for name in size.populations}
     valid = keys(size, robot, _with_finished(cells, wanted))
-    others = {name: cell for name, cell in cells.items() if cell["key"] == valid.get(name)}
+    others = {name: cell for name, cell in cells.items() if cell.get("key") == valid.get(name, "")}
     return others | run_tasks(_tasks(size, wanted, valid), folder, jobs=jobs, cluster=cluster, until=until, say=say)
 
 

@@ -2,7 +2,8 @@
 
 By **row** is what the paper does. It puts neighbours of every test row, a few milliseconds apart and with the same
 payload, into training, so that it measures memorising. By **payload**, **motion** or **world** no test row has its
-payload, motion or world in training: that measures what a learner makes of something new.
+payload, motion or world in training: that measures what a learner makes of something new. Two of a data set's list that
+are the same count as one.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from armload.errors import DatasetError
 from armload.lab.dataset.parquet_table import Dataset
+from armload.lab.dataset.provenance import canonical
 
 PAPER_FRACTIONS = (0.7, 0.15, 0.15)
 
@@ -34,17 +36,24 @@ def split_rows(dataset: Dataset, seed: int = 0, fractions: Sequence[float] = PAP
 
 def split_payloads(dataset: Dataset, seed: int = 0, fractions: Sequence[float] = PAPER_FRACTIONS) -> Split:
     """Whole payloads at random: every row of a payload goes the same way."""
-    return _split(dataset.payload, seed, fractions, "payloads")
+    return _split(_alike(dataset, "payload", "phi"), seed, fractions, "payloads")
 
 
 def split_motions(dataset: Dataset, seed: int = 0, fractions: Sequence[float] = PAPER_FRACTIONS) -> Split:
     """Whole motions at random."""
-    return _split(dataset.motion, seed, fractions, "motions")
+    return _split(_alike(dataset, "motion", "fingerprint"), seed, fractions, "motions")
 
 
 def split_worlds(dataset: Dataset, seed: int = 0, fractions: Sequence[float] = PAPER_FRACTIONS) -> Split:
     """Whole worlds at random."""
-    return _split(dataset.world, seed, fractions, "worlds")
+    return _split(_alike(dataset, "world", "fingerprint"), seed, fractions, "worlds")
+
+
+def _alike(dataset: Dataset, what: str, known_by: str) -> NDArray[np.intp]:
+    """Of each row (rows,), where its payload, motion or world is first listed."""
+    first: dict[bytes, int] = {}
+    alike = [first.setdefault(canonical(one[known_by]), k) for k, one in enumerate(dataset.provenance[f"{what}s"])]
+    return np.array(alike)[getattr(dataset, what)]
 
 
 def _split(group: NDArray[np.integer], seed: int, fractions: Sequence[float], what: str) -> Split:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from armload.arms import Arm, arm, payload_regressor
+from armload.errors import DatasetError
 from armload.inertia import InertialParameters
 from armload.lab.dataset import Dataset, build_dataset
 from armload.lab.evaluation import EvaluationRun
@@ -21,6 +22,7 @@ from armload.simulation import Run, Sensors, World, simulate_many
 
 # Seeds of what is drawn: kept apart, so that no run shares its noise with the training data.
 NOISE, WORLDS, FAMILY, MOTIONS, TARE, LOADINGS = 5000, 100, 7000, 300, 900, 20_000
+_WINDOWS, _WINDOW = (10.0, 12.0, 14.0), 6.0  # [s] of the real log: where its windows begin, and how long they last
 PANDA, CONTAINER = "panda", "container"  # the paper's arm and payloads
 
 
@@ -176,12 +178,17 @@ class Basis:
         from scipy.signal import savgol_filter
 
         log = read_recording(path, self.arm)
+        if log.duration < _WINDOWS[-1] + _WINDOW:
+            raise DatasetError(
+                f"the real log {path} lasts {log.duration:.1f} s: expected at least {_WINDOWS[-1] + _WINDOW:g} s, of "
+                f"which the first {_WINDOWS[0]:g} s are the tare"
+            )
         ddq = np.asarray(savgol_filter(log.dq, 101, 3, deriv=1, delta=1.0 / log.rate, axis=0))
         added = payload_regressor(self.arm.frame_motion(log.q), log.dq, ddq) @ self.truth.phi
         loaded = Recording(log.t, log.q, log.dq, log.tau + added, source="semi-real")
         start = float(log.t[0])
-        tare = log.between(start, start + 10.0)
-        windows = [(w, loaded.between(start + w, start + w + 6.0)) for w in (10.0, 12.0, 14.0)]
+        tare = log.between(start, start + _WINDOWS[0])
+        windows = [(w, loaded.between(start + w, start + w + _WINDOW)) for w in _WINDOWS]
         return [EvaluationRun(window, self.truth, f"real log from {w:g} s", tare) for w, window in windows]
 
 

@@ -73,7 +73,8 @@ def train(spec: Spec, basis: Basis, progress: bool = False) -> Trained:
     data = [a for rows in (split.train, split.validation) for a in (seen(dataset.X[rows]), dataset.y[rows])]
     model.fit(*data, progress=progress, checkpoint=checkpoint)
     file = basis.folder / "models" / f"{spec.name}.safetensors"
-    save_model(file, model, arm=basis.arm, motion=basis.motion, dataset_hash=dataset.hash, notes=spec.name)
+    about = {"dataset_hash": dataset.hash, "payloads": dataset.payload[np.r_[split.train, split.validation]]}
+    save_model(file, model, arm=basis.arm, motion=basis.motion, notes=spec.name, **about)
     for left in checkpoint.parent.glob(f"{spec.name}.*"):
         left.unlink()
     epochs = None if model.epochs_ is None else np.ravel(model.epochs_).tolist()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.errors import ModelError
+from armload.errors import ModelError, one_line
 from armload.lab.engine import Engine
 from armload.lab.episodes import Episode, simulate_episodes
 from armload.posterior import Evidence, SmoothPosteriorLeastSquares
@@ -78,10 +78,11 @@ class Records:
             ModelError: not such a file.
         """
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as data:
                 return cls(**{f.name: data[f.name] for f in fields(cls)})
-        except (OSError, ValueError, KeyError) as error:
-            raise ModelError(f"{path} holds no records of episodes ({error}): delete it and make it again") from None
+        except Exception as error:  # a damaged archive can fail anywhere between zip, zlib and the array header
+            why = one_line(error)
+            raise ModelError(f"{path} holds no records of episodes ({why}): delete it and make it again") from None
 
     @classmethod
     def joined(cls, parts: Sequence[Records]) -> Records:
