@@ -12,12 +12,15 @@ from scipy.stats import chi2
 from armload import Recording, arm, read_recording
 from armload.arms import payload_regressor
 from armload.devices import Simulator
+from armload.identification import with_tool
 from armload.inertia import InertialParameters
 from armload.motion import Motion, random_motion, taie2024
 from armload.online import OnlineIdentifier, watch
 from armload.online.event import Naming
 from armload.online.runs import Runs
 from armload.online.thresholds import SAME_RUN
+from armload.payloads import Payload
+from armload.payloads.uncertainty import Uncertainty
 from armload.simulation import Sensors, World, simulate
 
 
@@ -398,6 +401,23 @@ def test_what_is_put_down_is_gone_and_what_is_taken_up_again_is_recognised():
         max(estimate.age for estimate in estimates) < 0.05
     )  # samples get lost; an answer of seconds ago never returns
     assert np.all(again.std[:4] < first.std[:4])
+
+
+def test_what_is_put_down_is_gone_though_the_tool_weighs_less_than_its_file_says():
+    """What is left weighs less than nothing then, by the tool's error, and is the empty arm of what comes next."""
+    heavier, tool = box(0.76), box(0.6)  # two standard deviations
+    payload = HALF_KILO.phi + tool.phi
+    log = stream(2, [(0.0, InertialParameters(payload)), (4.0, tool), (8.0, InertialParameters(payload))], 9.5)
+    robot = with_tool(arm("panda"), Payload("gripper", heavier, uncertainty=Uncertainty(mass=0.08)))
+    identifier, events = OnlineIdentifier(robot), {}
+    for sample in log:
+        last = identifier.update(*sample)
+        if last.event is not None:
+            events[last.event.t] = last.event.kind
+    identifier.close()
+    assert [*events.values()] == ["release", "grasp"]
+    assert last.relative_to == "before"
+    assert covers(last, HALF_KILO.phi)[:4].all()
 
 
 def test_what_a_run_knew_counts_for_less_when_it_is_taken_up_again(monkeypatch):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.inertia import held
+from armload.inertia import Z95, held
 from armload.online.thresholds import LIGHT, REMEMBERED, RETURN_SHARE, RETURN_STD, SAME_RUN, STEP_STD, TARE_FROM
 from armload.posterior import PosteriorLeastSquares
 from armload.regression import payload_prior_std
@@ -65,7 +65,7 @@ class Runs:
         """
         mass, std = float(self.current.last.phi[0]), float(self.current.last.std[0])
         known = std <= STEP_STD * self.unit  # else nobody can tell whether anything is held
-        empty = known and not held(mass, std, known) and can_be(mass, std, self.unit)
+        empty = known and not held(mass, std, known) and can_be(mass, std, self.unit, tool_std(self.current))
         self._empty = self.current if empty else None
 
     def reference_for_next(self) -> PosteriorLeastSquares | None:
@@ -102,9 +102,18 @@ class Runs:
         return None if step is None else float(step[0][0])
 
 
-def can_be(mass: float, std: float, unit: float) -> bool:
-    """Whether anything has a mass, known to std [kg]: none is below nothing. `unit`: of a payload, as of `Runs`."""
-    return mass > -LIGHT * unit - std
+def can_be(mass: float, std: float, unit: float, tool: float = 0.0) -> bool:
+    """Whether anything has a mass, known to std [kg]: none is below nothing, but the tool may weigh less than its file.
+
+    unit: of a payload, as of `Runs`. tool: standard deviation of what the tool weighs, of which 95 % count [kg].
+    """
+    return mass > -LIGHT * unit - std - Z95 * tool
+
+
+def tool_std(run: PosteriorLeastSquares) -> float:
+    """How far the mass of a run may be off by the tool that the arm was given with [kg]; a tare has that error, too."""
+    error = run.arm.attached_error
+    return 0.0 if error is None or run.stream.tares else float(np.sqrt(error.covariance[0, 0]))
 
 
 def _step(before: PosteriorLeastSquares, run: PosteriorLeastSquares) -> Gaussian | None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armload.arms.momentum_row import MomentumRow, wrench_row
 from armload.online.modes import Modes
-from armload.online.runs import Gaussian, can_be
+from armload.online.runs import Gaussian, can_be, tool_std
 from armload.online.sticking import Sticking, stuck
 from armload.online.thresholds import (
     AFTER_CONTACT,
@@ -120,10 +120,10 @@ class Weighing:
         before, variance = float(phi[0]), float(known[0, 0])
         in_all, doubt = (before, variance) if state is None else state.mass_in_all(phi, known)
         in_all += 0.0 if tool is None else tool.mass
-        step, more = float(shift[0]), float(spread[0, 0])
+        step, more, lighter = float(shift[0]), float(spread[0, 0]), tool_std(run)
         return (
-            can_be(before + step, np.sqrt(variance + more), self._unit),
-            can_be(before, np.sqrt(variance), self._unit),
+            can_be(before + step, np.sqrt(variance + more), self._unit, lighter),
+            can_be(before, np.sqrt(variance), self._unit, lighter),
             can_be(in_all + step, np.sqrt(doubt + more), self._unit),
         )
 

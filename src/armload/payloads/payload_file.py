@@ -267,13 +267,16 @@ def _uncertainty(content: dict[str, Any], path: Path) -> Uncertainty:
     std = content.get("std")
     if std is None:
         return Uncertainty()
-    names = {"mass", "com", "inertia"}
-    if not isinstance(std, dict) or not set(std) <= names:
+    if not isinstance(std, dict) or not set(std) <= {"mass", "com", "inertia"}:
         raise PayloadError(
             f"payload file {path}: std is {json.dumps(std)[:80]}, expected an object with some of mass [kg], com [m] "
             "and inertia (a share)"
         )
-    return Uncertainty(**{key: float(_numbers(value, (), f"std of {key}", path)) for key, value in std.items()})
+    numbers = {key: float(_numbers(value, (), f"std of {key}", path)) for key, value in std.items()}
+    try:
+        return Uncertainty(**numbers)
+    except PayloadError as error:
+        raise PayloadError(f"payload file {path}: {error}") from None
 
 
 def _measured(content: dict[str, Any], path: Path) -> Measured | None:

@@ -36,7 +36,7 @@ def add_check_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--tare",
         metavar="LOG|MOTION",
-        help="an earlier run of the arm, with anything mounted (default: of a motion the same again, of a log none)",
+        help="an earlier run of the arm, with anything mounted (default: shows both none and the same again)",
     )
     add_column_arguments(parser)
     add("--json", action="store_true", help="print one JSON object and nothing else")
