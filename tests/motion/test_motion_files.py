@@ -137,7 +137,7 @@ NUMBERS = {key: [[0.0] * 7] * 2 for key in ("positions", "velocities", "accelera
 )
 def test_a_motion_file_whose_numbers_nobody_can_hold_is_refused_in_a_sentence(tmp_path, content):
     (tmp_path / "m.json").write_text(content)
-    with pytest.raises(MotionError, match=r"m\.json is not a motion: "):
+    with pytest.raises(MotionError, match=r"m\.json( is not a motion)?: "):
         load_motion(tmp_path / "m.json")
 
 

@@ -13,15 +13,14 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms.description import read_chain
+from armload.arms.given import check_limits, check_number, gravity_of
 from armload.arms.limits import Limits
 from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, placement_of
 from armload.errors import ArmError
 from armload.inertia import InertialParameters, Inexact, from_order, parameters_only
+from armload.runtime.real_numbers import own_reals, reals
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
-# [m/s²] least and most at a base that an arm works on: the Moon has 1.62, and a base on the Earth that brakes or turns
-# at one g beside it has 14. A stated guard: 1, which is gravity in g, is below it, 32 in ft/s² and 981 in cm/s² above
-GRAVITIES = (1.5, 20.0)
 # one `link_spread`: standard deviation of a link's mass [1], centre of mass [m] and inertia [1]
 LINK_SPREAD = (0.02, 0.002, 0.05)
 
@@ -77,20 +76,11 @@ class Arm:
     known_as: str | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        try:
-            gravity = np.asarray(self.gravity, dtype=float)
-        except (TypeError, ValueError):
-            gravity = np.full(3, np.nan)
-        if gravity.shape != (3,) or not np.all(np.isfinite(gravity)):
-            raise ArmError(f"gravity is {self.gravity!r}: expected 3 finite numbers x,y,z in m/s², such as 0,0,-9.81")
-        least, most = GRAVITIES
-        if not least <= np.linalg.norm(gravity) <= most:
-            raise ArmError(
-                f"gravity {tuple(gravity.tolist())} has magnitude {np.linalg.norm(gravity):.3g} m/s²: expected about "
-                f"9.81 on Earth (1.62 on the Moon, {least:g} to {most:g} anywhere); give it in m/s², not in g, in the "
-                "axes of the robot's base, pointing down"
-            )
-        object.__setattr__(self, "gravity", tuple(gravity.tolist()))
+        object.__setattr__(self, "gravity", gravity_of(self.gravity))
+        check_number(self.rated_payload, "the rated payload [kg]", zero=False)
+        check_number(self.link_spread, "the spread of the links", zero=True)
+        check_number(self.gear_loss, "the share that the gears rub away", zero=True)
+        check_number(self.torque_gain_std, "the standard deviation of the torque's scale", zero=False)
         chain = read_chain(self.urdf, self.frame, self.name)
         object.__setattr__(self, "urdf", chain.xml)
         object.__setattr__(self, "frame", chain.frame)
@@ -101,6 +91,8 @@ class Arm:
             object.__setattr__(self, "attached", replace(self, attached=None).in_frame(self.attached))
         if self.attached is None:
             object.__setattr__(self, "attached_error", None)
+        check_limits(self.acceleration, "the acceleration limit", self.n)
+        check_limits(self.jerk, "the jerk limit", self.n)
         _ = self._model  # fail now, not at the first sample
 
     def __getstate__(self) -> dict[str, Any]:
@@ -164,7 +156,10 @@ class Arm:
 
     def leaning(self, angles: ArrayLike) -> Arm:
         """The arm with gravity turned about the axes of `horizontal` by angles (2,) [rad]."""
-        turned = pin.exp3(np.asarray(angles, dtype=float) @ self.horizontal) @ np.asarray(self.gravity)
+        both = own_reals(angles, "the angles of gravity", ArmError)
+        if both.shape != (2,):
+            raise ArmError(f"the angles of gravity have shape {both.shape}: expected (2,), in rad")
+        turned = pin.exp3(both @ self.horizontal) @ np.asarray(self.gravity)
         return replace(self, gravity=tuple(turned.tolist()))
 
     def with_payload(self, payload: InertialParameters, error: Inexact | None = None) -> Arm:
@@ -183,9 +178,9 @@ class Arm:
 
     def with_links(self, links: ArrayLike) -> Arm:
         """The arm with other inertial parameters (n, 10) of its moving links, before any attached payload."""
-        links = np.asarray(links, dtype=float)
-        if links.shape != (self.n, 10):
-            raise ArmError(f"link parameters have shape {links.shape}: expected ({self.n}, 10)")
+        links = own_reals(links, "the table of link parameters", ArmError)
+        if links.shape != (self.n, 10) or not np.isfinite(links).all():
+            raise ArmError(f"link parameters have shape {links.shape}: expected ({self.n}, 10), all finite")
         return replace(self, links=links)
 
     def parted(self, links: ArrayLike) -> Arm:
@@ -238,8 +233,10 @@ class Arm:
 
     def mass_matrix(self, q: ArrayLike) -> NDArray[np.float64]:
         """Joint-space inertia M(q) (n, n) of one position q (n,) [kg·m²]."""
-        (one,), _, _ = self._samples(np.asarray(q, dtype=float)[None], None, None)
-        M = np.triu(pin.crba(self._model, self._data, one))
+        q, _, _ = self._samples(q, None, None)
+        if len(q) != 1:
+            raise ArmError(f"{len(q)} positions were given: expected one, {self.name} has {self.n} joints")
+        M = np.triu(pin.crba(self._model, self._data, q[0]))
         return M + np.triu(M, 1).T
 
     def momentum(self, q: ArrayLike, dq: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -310,9 +307,12 @@ class Arm:
         return placement_of(self._model, str(self.frame))
 
     def _samples(self, q: ArrayLike, dq: ArrayLike | None, ddq: ArrayLike | None) -> tuple[NDArray[np.float64], ...]:
-        q = np.asarray(q, dtype=float)
-        rows = [q, np.zeros_like(q) if dq is None else dq, np.zeros_like(q) if ddq is None else ddq]
-        out = tuple(np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float))) for x in rows)
+        try:
+            q = reals(q)
+            rows = [q, np.zeros_like(q) if dq is None else reals(dq), np.zeros_like(q) if ddq is None else reals(ddq)]
+        except ValueError as error:
+            raise ArmError(f"a joint array is {error}: expected real numbers ({self.n},) or (N, {self.n})") from None
+        out = tuple(np.ascontiguousarray(np.atleast_2d(x)) for x in rows)
         if any(x.shape != out[0].shape for x in out) or out[0].shape[1:] != (self.n,):
             raise ArmError(f"joint arrays have shapes {[x.shape for x in out]}: {self.name} has {self.n} joints")
         return out

@@ -19,7 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms.model import Arm
 from armload.arms.rigid_body import BodyMotion
+from armload.errors import ArmError
 from armload.inertia import inertia_matrix, skew
+from armload.runtime.real_numbers import reals
 
 # L(omega)·vech(I) = I·omega: the constant tensor (3, 6, 3)
 _L = np.moveaxis(inertia_matrix(np.eye(6)), 0, 1)
@@ -40,9 +42,12 @@ def payload_regressor(motion: BodyMotion, dq: ArrayLike, ddq: ArrayLike) -> NDAr
     Args:
         motion: the payload frame's motion, from `Arm.frame_motion(q)`.
         dq, ddq: (N, n) [rad/s, rad/s²].
+
+    Raises:
+        ArmError: no numbers, or of other samples or joints.
     """
     J = motion.jacobian
-    dq, ddq = np.atleast_2d(dq), np.atleast_2d(ddq)
+    dq, ddq = _rows(motion, dq), _rows(motion, ddq)
     nu, J_tilde = _twist_and_jacobian_rate(J, dq)
     J_dot = J_tilde - _motion_cross(nu[:, :, None], J)
     a = np.einsum("tij,tj->ti", J, ddq) + np.einsum("tij,tj->ti", J_dot, dq)
@@ -59,9 +64,12 @@ def momentum_regressor(motion: BodyMotion, dq: ArrayLike) -> MomentumRegressor:
     Args:
         motion: the body's motion, from `Arm.frame_motion(q)` or one of `Arm.link_motions(q)`.
         dq: (N, n) [rad/s].
+
+    Raises:
+        ArmError: no numbers, or of other samples or joints.
     """
     J = motion.jacobian
-    nu, J_tilde = _twist_and_jacobian_rate(J, np.atleast_2d(dq))
+    nu, J_tilde = _twist_and_jacobian_rate(J, _rows(motion, dq))
     A_h, Jt = _momentum_matrix(nu), np.swapaxes(J, 1, 2)
     return MomentumRegressor(Jt @ A_h, Jt @ _gravity_matrix(motion.gravity) - np.swapaxes(J_tilde, 1, 2) @ A_h)
 
@@ -81,6 +89,18 @@ def leaning_torque(arm: Arm, q: ArrayLike) -> NDArray[np.float64]:
     weights = [replace(arm, gravity=tuple(np.asarray(arm.gravity) + sign * g)) for g in change for sign in (0.5, -0.5)]
     up, down, up_too, down_too = (other.torque(np.atleast_2d(q)) for other in weights)
     return np.stack([up - down, up_too - down_too], axis=2)
+
+
+def _rows(motion: BodyMotion, values: ArrayLike) -> NDArray[np.float64]:
+    """Joint velocities or accelerations (N, n) of the samples of a motion, or (1, n) of all of them."""
+    samples, _, joints = motion.jacobian.shape
+    try:
+        out = np.atleast_2d(reals(values))
+    except ValueError as error:
+        raise ArmError(f"joint rates are {error}: expected real numbers ({samples}, {joints})") from None
+    if out.shape not in ((samples, joints), (1, joints)):
+        raise ArmError(f"joint rates have shape {out.shape}: expected ({samples}, {joints}) as the motion has")
+    return out
 
 
 def _twist_and_jacobian_rate(J: NDArray, dq: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

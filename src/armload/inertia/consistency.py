@@ -81,7 +81,7 @@ def from_log_cholesky(theta: ArrayLike) -> NDArray[np.float64]:
     """phi of log-Cholesky coordinates (10,): consistent for every real θ.
 
     Raises:
-        InertiaError: θ is not ten numbers.
+        InertiaError: θ is not ten finite numbers.
     """
     U = _root_of_chart(theta)
     return pseudo_inertia_to_phi(U @ U.T)
@@ -98,7 +98,7 @@ def log_cholesky_curvature(theta: ArrayLike, weights: ArrayLike) -> NDArray[np.f
     """∂²(weights·phi)/∂θ² (10, 10) of `from_log_cholesky`, weights (10,): what Newton's method needs beside ∂phi/∂θ."""
     U = _root_of_chart(theta)
     dU = _root_derivatives(U)
-    entries = pseudo_inertia_to_phi(np.eye(16).reshape(16, 4, 4)) @ np.asarray(weights, dtype=float)
+    entries = pseudo_inertia_to_phi(np.eye(16).reshape(16, 4, 4)) @ _one(weights, "weights")
     G = entries.reshape(4, 4)
     G = 0.5 * (G + G.T)  # weights·phi = tr(G·J)
     curvature = 2.0 * np.einsum("iab,bc,jca->ij", np.swapaxes(dU, 1, 2), G, dU)
@@ -121,7 +121,10 @@ def _root_derivatives(U: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _root_of_chart(theta: ArrayLike) -> NDArray[np.float64]:
-    alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = _one(theta, "theta")
+    theta = _one(theta, "theta")
+    if not np.isfinite(theta).all():
+        raise InertiaError(f"theta is {theta.tolist()}: expected 10 finite numbers")
+    alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = theta
     return np.exp(alpha) * np.array(
         [[np.exp(d1), s12, s13, t1], [0, np.exp(d2), s23, t2], [0, 0, np.exp(d3), t3], [0, 0, 0, 1]]
     )

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
 from armload.inertia.parameters import InertialParameters, inertia_matrix, parameters_only, phi_to_com, vech
+from armload.runtime.real_numbers import reals
 
 # position of each of the other program's six inertia numbers in (xx, xy, xz, yy, yz, zz)
 _ABOUT_ORIGIN = {"paper": [0, 1, 2, 3, 4, 5], "pinocchio": [0, 1, 3, 2, 4, 5]}
@@ -62,9 +63,11 @@ def from_order(values: ArrayLike, order: str, frame: str | None = None) -> Inert
     _known(order)
     expected = 13 if order == "franka" else 10
     try:
-        v = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InertiaError(f"{values!r} is not numeric: expected {expected} numbers in the order {order!r}") from None
+        v = reals(values)
+    except ValueError as error:
+        raise InertiaError(
+            f"values not numeric: found {error}, {expected} numbers expected in the order {order!r}"
+        ) from None
     if v.shape != (expected,):
         raise InertiaError(f"{v.size} numbers given in the order {order!r}: expected {expected}")
     if order in _ABOUT_ORIGIN:

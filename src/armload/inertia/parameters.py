@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import InertiaError
+from armload.runtime.real_numbers import reals
 
 # Names of the ten parameters, in the order of Taie et al. 2024.
 NAMES = ("m", "m·rx", "m·ry", "m·rz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -34,9 +35,9 @@ def numbers(values: ArrayLike, name: str, *shape: int) -> NDArray[np.float64]:
     """
     expected = f"expected {'×'.join(map(str, shape))} numbers"
     try:
-        out = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InertiaError(f"{name} is not numeric: {expected}, found {values!r}") from None
+        out = reals(values)
+    except ValueError as error:
+        raise InertiaError(f"{name} is not numeric: {expected}, found {error}") from None
     if out.shape[-len(shape) :] != shape:
         raise InertiaError(f"{name} has shape {out.shape}: {expected}")
     return out
@@ -75,7 +76,7 @@ def com_to_phi(mass: float, com: ArrayLike, inertia_com: ArrayLike) -> NDArray[n
     r, inertia = _vector3(com, "com"), _symmetric(inertia_com, "inertia_com")
     try:
         m = float(mass)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         m = np.nan
     if not np.isfinite(m):
         raise InertiaError(f"mass is {mass!r}: expected a finite number of kilograms")
@@ -226,9 +227,9 @@ def parameters_only(given: InertialParameters) -> InertialParameters:
 
 def _phi(values: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
     try:
-        phi = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InertiaError(f"phi is not numeric: expected 10 numbers, found {values!r}") from None
+        phi = reals(values)
+    except ValueError as error:
+        raise InertiaError(f"phi is not numeric: expected 10 numbers, found {error}") from None
     if phi.shape != (10,):
         raise InertiaError(f"phi has shape {phi.shape}: expected 10 numbers ({', '.join(NAMES)})")
     if not np.all(np.isfinite(phi)):
@@ -239,8 +240,8 @@ def _phi(values: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
 
 def _vector3(values: ArrayLike, name: str) -> NDArray[np.float64]:
     try:
-        v = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
+        v = reals(values)
+    except ValueError:
         v = np.full(3, np.nan)
     if v.shape != (3,) or not np.all(np.isfinite(v)):
         raise InertiaError(f"{name} is {values!r}: expected 3 finite numbers")

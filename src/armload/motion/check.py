@@ -100,9 +100,13 @@ def check_motion(
         rate, collision_rate: how often limits and clearances are looked at [Hz].
 
     Raises:
-        MotionError: the motion has another number of joints than the arm.
+        MotionError: the motion has another number of joints than the arm; a rate, radius or floor that is none.
     """
     check_joints(motion, arm)
+    if not 0.0 <= payload_radius < np.inf:
+        raise MotionError(f"the payload's ball has a radius of {payload_radius!r} m: expected a number of 0 or more")
+    if floor is not None and not np.isfinite(floor):
+        raise MotionError(f"the floor is at {floor!r} m: expected a finite height, or None where there is none")
     t = motion.looked_at(rate)
     q, dq, ddq = motion(t)
     jerk = motion.jerk(t)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import MotionError
 from armload.motion.motion import Motion
+from armload.runtime.real_numbers import own_reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +51,12 @@ class FourierMotion(Motion):
 
     def __post_init__(self) -> None:
         for name, dims in (("offset", 1), ("sine", 2), ("cosine", 2)):
-            value = np.array(getattr(self, name), dtype=float)
+            value = own_reals(getattr(self, name), f"{name} of the motion {self.name!r}", MotionError)
             if value.ndim != dims or value.size == 0 or not np.all(np.isfinite(value)):
                 expected = "(n,)" if dims == 1 else "(n, K)"
                 raise MotionError(
                     f"{name} of the motion {self.name!r} has shape {value.shape}: expected {expected}, finite, in rad"
                 )
-            value.setflags(write=False)
             object.__setattr__(self, name, value)
         if self.sine.shape != self.cosine.shape or len(self.sine) != len(self.offset):
             raise MotionError(
@@ -105,7 +105,12 @@ class FourierMotion(Motion):
 
     def scaled(self, factor: float | ArrayLike) -> FourierMotion:
         """The motion with all amplitudes, or each joint's (n,), multiplied; offsets and rest at the ends stay."""
-        factor = np.broadcast_to(np.asarray(factor, dtype=float), (self.n,))[:, None]
+        factor = own_reals(factor, "the factor", MotionError)
+        if factor.shape not in ((), (self.n,)):
+            raise MotionError(
+                f"the factor has shape {factor.shape}: expected one number or {self.n}, one for each joint"
+            )
+        factor = np.broadcast_to(factor, (self.n,))[:, None]
         return replace(self, sine=self.sine * factor, cosine=self.cosine * factor)
 
 
@@ -114,7 +119,12 @@ def start_and_stop_at_rest(sine: ArrayLike, cosine: ArrayLike) -> tuple[NDArray[
 
     >>> start_and_stop_at_rest([[1.0, 0.0]], [[0.0, 0.0]])[0].round(3)
     array([[ 0.8, -0.4]])
+
+    Raises:
+        MotionError: other shapes, or no numbers.
     """
-    sine, cosine = np.asarray(sine, dtype=float), np.asarray(cosine, dtype=float)
+    sine, cosine = (own_reals(x, "a table of coefficients", MotionError) for x in (sine, cosine))
+    if sine.ndim != 2 or sine.size == 0 or cosine.shape != sine.shape:
+        raise MotionError(f"coefficients of shapes {sine.shape} and {cosine.shape}: expected (n, K) of both")
     k = np.arange(1.0, sine.shape[-1] + 1.0)
     return sine - np.outer(sine @ k, k) / (k @ k), cosine - np.outer(cosine @ k**2, k**2) / (k**2 @ k**2)

@@ -7,6 +7,9 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armload.errors import MotionError
+from armload.runtime.real_numbers import reals
+
 # of a piece, where a check looks: half way a quintic from rest to rest is fastest, near a fifth it accelerates most
 _WITHIN = np.array([0.0, 0.2, 0.5, 0.8])
 
@@ -48,7 +51,12 @@ class Motion(ABC):
         >>> from armload.motion import taie2024
         >>> taie2024().instants(0.5).tolist()
         [0.0, 2.0, 4.0, 6.0]
+
+        Raises:
+            MotionError: the rate is not a positive number of Hz.
         """
+        if not (0.0 < rate < np.inf):
+            raise MotionError(f"a rate of {rate!r} Hz: expected a positive number")
         return np.linspace(0.0, self.duration, max(2, round(self.duration * rate) + 1))
 
     def looked_at(self, rate: float) -> NDArray[np.float64]:
@@ -77,7 +85,12 @@ class Motion(ABC):
         return self._at(t, 3)
 
     def _at(self, t: ArrayLike, order: int) -> NDArray[np.float64]:
-        t = np.atleast_1d(np.asarray(t, dtype=float))
+        try:
+            t = np.atleast_1d(reals(t))
+        except ValueError as error:
+            raise MotionError(f"the times are {error}: expected seconds (N,)") from None
+        if t.ndim != 1 or np.isnan(t).any():
+            raise MotionError(f"the times have shape {t.shape} or hold one that is no number: expected seconds (N,)")
         inside = np.clip(t, 0.0, self.duration)
         out = self.derivative(inside, order)
         if order:

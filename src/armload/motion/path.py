@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from armload.errors import MotionError
 from armload.motion.motion import Motion
 from armload.recording.templates import abridged
+from armload.runtime.real_numbers import own_reals
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +48,7 @@ class PathMotion(Motion):
 
     def __post_init__(self) -> None:
         for name in ("times", "positions", "velocities", "accelerations"):
-            value = np.array(getattr(self, name), dtype=float)
-            value.setflags(write=False)
+            value = own_reals(getattr(self, name), f"{name} of the path {self.name!r}", MotionError)
             object.__setattr__(self, name, value)
         points = (self.positions, self.velocities, self.accelerations)
         shape = self.positions.shape

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from armload.errors import MotionError
 from armload.motion.motion import Motion
+from armload.runtime.real_numbers import own_reals
 
 _RAMP = np.polynomial.Polynomial([0.0, 0.0, 0.0, 1.0, -0.5])  # the integral of 3u² − 2u³
 
@@ -47,8 +48,7 @@ class PointToPoint(Motion):
 
     def __post_init__(self) -> None:
         for name in ("poses", "starts", "ends"):
-            value = np.array(getattr(self, name), dtype=float)
-            value.setflags(write=False)
+            value = own_reals(getattr(self, name), f"{name} of the motion {self.name!r}", MotionError)
             object.__setattr__(self, name, value)
         segments = len(self.poses) - 1
         if self.poses.ndim != 2 or segments < 1 or not self.starts.shape == self.ends.shape == (segments,):

@@ -11,6 +11,7 @@ from armload.motion.check import check_motion, rated_load
 from armload.motion.collision import POSE_FLOOR, POSE_SELF, CapsuleArm, capsule_arm
 from armload.motion.fourier import FourierMotion
 from armload.motion.motion_file import shipped_motion
+from armload.runtime.real_numbers import own_reals
 
 _SPEED = 1.5  # [rad/s] velocity limit of an arm whose maker gives none
 _TO_SPEED = 0.25  # [s] in which it reaches its velocity limit, where no acceleration limit is given
@@ -71,6 +72,8 @@ def random_motion(
         raise MotionError(f"{harmonics} harmonic(s) asked for: expected at least 2, a single one cannot start at rest")
     if not (np.isfinite(duration) and duration > 0):
         raise MotionError(f"a motion of {duration} s asked for: expected a positive number of seconds")
+    if not (isinstance(seed, int | np.integer) and seed >= 0):
+        raise MotionError(f"seed is {seed!r}: expected a whole number of 0 or more")
     rng = np.random.default_rng(seed)
     limits, model, load = filled_limits(arm.limits), capsule_arm(arm), rated_load(arm)
     best: tuple[float, FourierMotion] | None = None
@@ -78,7 +81,7 @@ def random_motion(
     if around is None:
         poses = clear_poses(arm, model, rng, floor, _POSES, POSE_FLOOR, POSE_SELF)[:_TRIALS]
     else:
-        poses = np.tile(np.asarray(around, dtype=float), (_TRIALS, 1))
+        poses = np.tile(own_reals(around, "the mean pose", MotionError), (_TRIALS, 1))
         if poses.shape != (_TRIALS, arm.n):
             raise MotionError(f"the mean pose has shape {poses.shape[1:]}: expected ({arm.n},)")
     for pose in poses:

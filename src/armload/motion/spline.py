@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from armload.errors import MotionError
 from armload.motion.motion import Motion
+from armload.runtime.real_numbers import own_reals
 
 DEGREE = 5
 _ENDS = 3  # functions left out at each end: value, slope and curvature
@@ -50,13 +51,12 @@ class SplineMotion(Motion):
 
     def __post_init__(self) -> None:
         for name, dims in (("start", 1), ("control", 2)):
-            value = np.array(getattr(self, name), dtype=float)
+            value = own_reals(getattr(self, name), f"{name} of the motion {self.name!r}", MotionError)
             if value.ndim != dims or value.size == 0 or not np.all(np.isfinite(value)):
                 expected = "(n,)" if dims == 1 else "(n, K)"
                 raise MotionError(
                     f"{name} of the motion {self.name!r} has shape {value.shape}: expected {expected}, finite, in rad"
                 )
-            value.setflags(write=False)
             object.__setattr__(self, name, value)
         if len(self.control) != len(self.start):
             raise MotionError(

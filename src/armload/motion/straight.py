@@ -19,6 +19,7 @@ from armload.errors import MotionError
 from armload.motion.blended import QUINTIC
 from armload.motion.motion import Motion
 from armload.motion.random_fourier import filled_limits
+from armload.runtime.real_numbers import own_reals
 
 _FASTEST, _HARDEST, _SHARPEST = 15.0 / 8.0, 10.0 / np.sqrt(3.0), 60.0  # the largest |b'|, |b''| and |b'''|
 _SHORTEST = 1.0  # [s] also of a way of no length
@@ -48,8 +49,7 @@ class StraightMotion(Motion):
 
     def __post_init__(self) -> None:
         for name in ("start", "stop"):
-            value = np.array(getattr(self, name), dtype=float)
-            value.setflags(write=False)
+            value = own_reals(getattr(self, name), f"{name} of the way {self.name!r}", MotionError)
             object.__setattr__(self, name, value)
         start, stop = np.asarray(self.start), np.asarray(self.stop)
         if start.ndim != 1 or stop.shape != start.shape or not np.all(np.isfinite(start + stop)):

@@ -53,8 +53,7 @@ def random_payload(seed: int) -> Payload:
 
 def random_payloads(count: int, seed: int) -> list[Payload]:
     """`count` independent random payloads; a longer list of the same seed begins with the shorter one."""
-    if count < 0:
-        raise PayloadError(f"{count} random payloads asked for: expected a count of 0 or more")
+    count = _whole(count, "the count of random payloads")
     return [_draw(np.random.default_rng([_seed(seed), k]), f"random {seed}-{k}") for k in range(count)]
 
 
@@ -146,6 +145,14 @@ def _draw(rng: np.random.Generator, name: str) -> Payload:
 
 
 def _seed(seed: int) -> int:
-    if int(seed) != seed or seed < 0:
-        raise PayloadError(f"seed is {seed!r}: expected a whole number of 0 or more")
-    return int(seed)
+    return _whole(seed, "seed")
+
+
+def _whole(value: int, what: str) -> int:
+    try:
+        number = int(value)
+    except (TypeError, ValueError, OverflowError):
+        number = -1
+    if number != value or number < 0:
+        raise PayloadError(f"{what} is {value!r}: expected a whole number of 0 or more")
+    return number

@@ -12,6 +12,7 @@ from armload.errors import PayloadError
 from armload.inertia import InertialParameters, is_consistent
 from armload.payloads import solids
 from armload.payloads.uncertainty import Measured, Uncertainty
+from armload.runtime.real_numbers import reals
 
 _WATER = 1000.0  # [kg/m³]
 INERTIA_ASSUMED = "the inertia is not given: that of a ball as dense as water about the centre of mass is taken"
@@ -40,8 +41,8 @@ class Box:
     def __post_init__(self) -> None:
         size = solids.positive_vector(self.size, "size of the box")
         try:
-            centre = np.asarray(self.centre, dtype=float)
-        except (TypeError, ValueError, OverflowError):
+            centre = reals(self.centre)
+        except ValueError:
             centre = np.empty(0)
         if centre.shape != (3,) or not np.all(np.isfinite(centre)):
             raise PayloadError(f"centre of the box is {self.centre!r}: expected 3 finite numbers in metres")

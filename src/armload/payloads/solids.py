@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters
+from armload.runtime.real_numbers import reals
 
 
 def box(
@@ -89,7 +90,7 @@ def sphere(
     0.01
     """
     r = positive(radius, "radius of the sphere")
-    m = mass_of("the sphere", 4 / 3 * np.pi * r**3, mass, density)
+    m = mass_of("the sphere", 4 / 3 * np.pi * r * r * r, mass, density)
     return placed(InertialParameters.from_com(m, np.zeros(3), 0.4 * m * r * r * np.eye(3)), None, translation, frame)
 
 
@@ -141,8 +142,8 @@ def positive(value: float | None, name: str) -> float:
 def positive_vector(values: ArrayLike, name: str) -> NDArray[np.float64]:
     """`values` as an array (3,), if they are three finite numbers above zero."""
     try:
-        v = np.asarray(values, dtype=float)
-    except (TypeError, ValueError, OverflowError):
+        v = reals(values)
+    except ValueError:
         v = np.empty(0)
     if v.shape != (3,) or not np.all(np.isfinite(v)) or not np.all(v > 0):
         raise PayloadError(f"{name} is {values!r}: expected 3 finite numbers above 0 in metres")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from armload.errors import PayloadError
 from armload.inertia import InertialParameters, com_to_phi, inertia_matrix, vech
+from armload.runtime.real_numbers import reals
 
 _STEP = 1e-6  # of a difference quotient: phi is of second degree in r, so that a central one is exact but for rounding
 _ROUNDING = 1e-6  # of a correlation: what printed digits leave
@@ -38,10 +39,10 @@ class Uncertainty:
     inertia: float = 0.0
 
     def __post_init__(self) -> None:
-        if not all(np.isfinite(x) and x >= 0.0 for x in (self.mass, self.com, self.inertia)):
+        if not all(_can_be(x) for x in (self.mass, self.com, self.inertia)):
             raise PayloadError(
-                f"an uncertainty of {self.mass:g} kg, {self.com:g} m and {self.inertia:g} of the inertia: expected "
-                "numbers of 0 or more"
+                f"an uncertainty of {self.mass} kg, {self.com} m and {self.inertia} of the inertia: expected numbers "
+                "of 0 or more"
             )
 
     def covariance(self, body: InertialParameters) -> NDArray[np.float64]:
@@ -74,14 +75,29 @@ class Measured:
     calibrated: bool = True
 
     def __post_init__(self) -> None:
-        scale = np.sqrt(np.abs(np.diag(self.covariance)))
-        unit = self.covariance / np.outer(scale, scale).clip(np.finfo(float).tiny)
+        expected = "expected a symmetric matrix (10, 10) without eigenvalues below zero"
+        try:
+            covariance = reals(self.covariance).copy()
+        except ValueError as error:
+            raise PayloadError(f"the covariance of phi is {error}: {expected}") from None
+        if covariance.shape != (10, 10) or not np.isfinite(covariance).all():
+            raise PayloadError(f"the covariance of phi has shape {covariance.shape} or is not finite: {expected}")
+        scale = np.sqrt(np.abs(np.diag(covariance)))
+        unit = covariance / np.outer(scale, scale).clip(np.finfo(float).tiny)
         if not np.allclose(unit, unit.T, atol=_ROUNDING) or np.linalg.eigvalsh(unit)[0] < -_ROUNDING:
-            raise PayloadError(
-                "the covariance of phi is none: expected a symmetric matrix (10, 10) without eigenvalues below zero"
-            )
+            raise PayloadError(f"the covariance of phi is none: {expected}")
+        covariance.setflags(write=False)
+        object.__setattr__(self, "covariance", covariance)
 
 
 def _phi(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """phi (10,) of mass, centre and inertia about it, (10,)."""
     return com_to_phi(x[0], x[1:4], inertia_matrix(x[4:]))
+
+
+def _can_be(std: float) -> bool:
+    """Whether it is a standard deviation of 0 or more whose square is finite, too."""
+    try:
+        return float(std) >= 0.0 and float(std) * float(std) < np.inf
+    except (TypeError, ValueError, OverflowError):
+        return False

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.errors import IdentificationError
 from armload.inertia import HELD
 from armload.inertia.determinacy import LIGHTEST_HELD
+from armload.runtime.real_numbers import own_reals
 
 # [standard deviations] of a centre's three coordinates: as unlikely of the truth as `HELD` of a mass, 0.27 %
 # (test_three_coordinates_are_as_seldom_denied_as_one_mass)
@@ -53,7 +54,7 @@ class KnownMass:
     std: float
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.mass < np.inf and 0.0 < self.std < np.inf):
+        if not (0.0 < self.mass < np.inf and _can_be(self.std)):
             raise IdentificationError(
                 f"a known mass of {self.mass:g} ± {self.std:g} kg: expected a number and a standard deviation above "
                 "zero, both in kg; leave it out where nothing was weighed"
@@ -83,8 +84,8 @@ class KnownCentre:
     std: float
 
     def __post_init__(self) -> None:
-        com = np.asarray(self.com, dtype=float)
-        if com.shape != (3,) or not (np.all(np.isfinite(com)) and np.isfinite(self.std) and self.std > 0.0):
+        com = own_reals(self.com, "a known centre of mass", IdentificationError)
+        if com.shape != (3,) or not (np.all(np.isfinite(com)) and _can_be(self.std)):
             raise IdentificationError(
                 f"a known centre of mass of {self.com} ± {self.std:g} m: expected three numbers and a standard "
                 "deviation above zero"
@@ -131,7 +132,8 @@ class KnownBody:
     covariance: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        phi, covariance = (np.asarray(x, dtype=float) for x in (self.phi, self.covariance))
+        phi = own_reals(self.phi, "phi of a known body", IdentificationError)
+        covariance = own_reals(self.covariance, "the covariance of a known body", IdentificationError)
         unit = np.sqrt(np.abs(np.diag(covariance))) if covariance.shape == (10, 10) else np.zeros(10)
         if phi.shape != (10,) or not (
             np.all(np.isfinite(phi)) and np.all(np.isfinite(covariance)) and np.all(unit > 0)
@@ -281,3 +283,8 @@ def _given(
     left = np.eye(len(mean)) - K @ rows
     rest = left @ covariance @ left.T + K @ R @ K.T
     return mean + K @ (z - rows @ mean), 0.5 * (rest + rest.T)
+
+
+def _can_be(std: float) -> bool:
+    """Whether it is a standard deviation above zero whose square is a number above zero, too."""
+    return bool(std > 0.0 and 0.0 < std * std < np.inf)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armload.errors import RecordingError
+from armload.errors import RecordingError, one_line
+from armload.runtime.real_numbers import reals
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -50,7 +51,7 @@ class Recording:
         joint_names: names of the columns, where the source has them; None: they are only counted, in whatever order.
         source: where it comes from (a path), for messages and provenance.
         notes: what a reader did to the log that its user should know (rows dropped, say), one sentence each.
-        epoch: time since 1970 at t = 0 [s], where the source has stamps that t is counted from; else 0.
+        epoch: time since 1970 at t = 0 [s], finite, where the source has stamps that t is counted from; else 0.
         gravity_of: the arm, with what its controller was set to carry, whose gravity was put back into tau
             (`with_gravity`); None: tau is as the source has it.
 
@@ -75,6 +76,16 @@ class Recording:
             value = _numbers(getattr(self, name), f"{self.source}: {name}")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+        try:
+            epoch = float(self.epoch)
+        except (TypeError, ValueError, OverflowError):
+            epoch = np.nan
+        if not np.isfinite(epoch) or isinstance(self.notes, str):
+            raise RecordingError(
+                f"{self.source}: the epoch is {self.epoch!r} and the notes are {self.notes!r}: expected finite seconds "
+                "since 1970, and a tuple of sentences"
+            )
+        object.__setattr__(self, "notes", tuple(self.notes))
         if self.channel not in CHANNELS:
             raise RecordingError(f"unknown torque channel {self.channel!r}: expected one of {', '.join(CHANNELS)}")
         if self.t.ndim != 1 or self.q.ndim != 2:
@@ -85,8 +96,10 @@ class Recording:
                 raise RecordingError(
                     f"{self.source}: {name} has shape {value.shape}, expected {(len(self.t), self.q.shape[1])}"
                 )
+        if self.n == 0:
+            raise RecordingError(f"{self.source}: q has shape {self.q.shape}: expected at least one joint")
         if self.joint_names is not None:
-            if isinstance(self.joint_names, str) or len(self.joint_names) != self.n:
+            if isinstance(self.joint_names, str) or np.ndim(self.joint_names) != 1 or len(self.joint_names) != self.n:
                 raise RecordingError(
                     f"{self.source}: the joint names are {self.joint_names!r}: expected one for each of {self.n} joints"
                 )
@@ -163,24 +176,30 @@ class Recording:
         return replace(self, dq=np.concatenate(list(parts)))
 
     def select(self, rows: NDArray | slice) -> Recording:
-        """The samples at the given rows (index array, mask or slice)."""
-        return replace(self, t=self.t[rows], q=self.q[rows], dq=self.dq[rows], tau=self.tau[rows])
+        """The samples at the given rows (index array, mask or slice).
+
+        Raises:
+            RecordingError: rows that it does not have, fewer than two, or not in the order of time.
+        """
+        try:
+            return replace(self, t=self.t[rows], q=self.q[rows], dq=self.dq[rows], tau=self.tau[rows])
+        except IndexError as error:
+            raise RecordingError(
+                f"{self.source}: no such rows ({one_line(error)}): expected indices, a mask or a slice of its "
+                f"{len(self)} samples"
+            ) from None
 
 
 def _numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """A copy of the values as floats: the caller's stays writable. Dates and complex numbers would be cast in silence.
+    """A copy of the values as floats: the caller's stays writable.
 
     Raises:
         RecordingError: they are no numbers.
     """
     try:
-        given = np.asarray(values)
-        if given.dtype.kind not in "cMm":
-            return np.array(given, dtype=float, order="C")
-        held = f"{given.dtype}"
-    except (TypeError, ValueError):
-        held = f"a {type(values).__name__} of something else"
-    raise RecordingError(
-        f"{what} is {held}: expected real numbers, as many in each row; of dates the seconds since the first, "
-        "(dates - dates[0]) / np.timedelta64(1, 's')"
-    ) from None
+        return np.array(reals(values), order="C")
+    except ValueError as error:
+        raise RecordingError(
+            f"{what} is {error}: expected real numbers, as many in each row and none masked; of dates the seconds "
+            "since the first, (dates - dates[0]) / np.timedelta64(1, 's')"
+        ) from None

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.errors import ArmError
+from armload.runtime.real_numbers import own_reals
 
 _NUDGE = 1e-6  # [rad/s] finite difference for the slope
 _EXTRAS = ("asymmetry", "stribeck", "viscous", "load")  # what is zero in plain friction
@@ -58,12 +59,13 @@ class Friction:
         for entry in fields(self):
             default = 0.1 if entry.name == "stribeck_velocity" else 0.0
             given = getattr(self, entry.name)
-            value = np.full(shape, default) if given is None else np.array(given, dtype=float)
+            value = own_reals(
+                np.full(shape, default) if given is None else given, f"{entry.name} of the friction", ArmError
+            )
             if value.ndim != 1 or value.shape != shape or not np.all(np.isfinite(value)):
                 raise ArmError(f"{entry.name} of the friction has shape {value.shape}: expected {shape}, all finite")
             if entry.name in ("width", "stribeck_velocity") and not np.all(value > 0):
                 raise ArmError(f"{entry.name} of the friction is {value.tolist()}: expected numbers above 0 rad/s")
-            value.setflags(write=False)
             object.__setattr__(self, entry.name, value)
 
     @classmethod

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
 from armload.errors import ArmError
+from armload.runtime.real_numbers import own_reals
 from armload.simulation.friction import Friction
 from armload.simulation.model_error import (
     GAIN,
@@ -100,12 +101,11 @@ class World:
         ):
             if getattr(self, name) is None:
                 continue
-            value = np.array(getattr(self, name), dtype=float)
+            value = own_reals(getattr(self, name), f"{name} of the world {self.name!r}", ArmError)
             if value.shape != shape or not np.all(np.isfinite(value)):
                 raise ArmError(
                     f"{name} of the world {self.name!r} has shape {value.shape}: expected {shape}, all finite"
                 )
-            value.setflags(write=False)
             object.__setattr__(self, name, value)
         if len(self.friction.level) != n:
             raise ArmError(f"the friction of the world {self.name!r} is of {len(self.friction.level)} joints, not {n}")
