@@ -379,6 +379,25 @@ def test_what_holds_for_a_minute_is_what_was_measured():
             assert last == f"{100 * cell['inside'][-1]:.1f} ± {100 * cell['standard error'][-1]:.1f}"
 
 
+def test_what_holds_in_another_world_is_what_was_measured():
+    page = words_of("hybrid_measured")
+    found = result_of("another_world")["robots"]
+    for robot, by_world in found.items():
+        for world, cell in by_world.items():
+            (row,) = re.findall(rf"\| {robot} \| {world} \| {cell['logs']} \|[^\n]*?(?= \| {robot}| <!--|$)", page)
+            for group in ("mass", "first moments", "inertia"):
+                of = cell[group]
+                assert f"{100 * of['inside']:.0f} ± {100 * of['standard error']:.0f}" in row
+    shares = [
+        f"{100 * of['inside']:.0f} ± {100 * of['standard error']:.0f}"
+        for world in ("small motions", "without waves")
+        for robot in ("ur5e", "ur10e")
+        for of in [found[robot][world]["first moments"]]
+    ]
+    said = "Of a UR5e's {} % lie inside, of a UR10e's {} %; without the waves {} and {} %."
+    assert said.format(*shares[:3], shares[3]) in page
+
+
 def test_new_episodes_are_answered_as_the_page_says():
     page = " ".join((ROOT / "docs" / "hybrid_measured.md").read_text(encoding="utf-8").split())
     found = json.loads((RESULTS / "fresh_episodes_panda.json").read_text())
