@@ -3,12 +3,12 @@
     python benchmarks/another_world.py [--robots panda,gen3,ur5e,ur10e] [--logs 60] [--seed 0] [--seconds 10] [--jobs 1]
 
 Each log is another arm and payload, with a tare of 20 s, at 200 Hz. Motions are those of minute_logs.py, or *small*
-ones: run and tare each about a centre of its own, drawn from the middle half of the joints' ranges, no joint further
+ones: run and tare each about a centre of its own, drawn from the middle quarter of the joints' ranges, no joint further
 than 0.6 rad from it, at up to 60 % of its speed limit and 1.3 rad/s; every other log five harmonics of 0.1 Hz, else
 from pose to pose, with pauses of up to 0.4 s. The arm follows its motion exactly (Pinocchio), and its torque, in shares
 of the effort limit, is another than `World.real_like` draws:
 
-links     2 % of mass, 2 mm of centre, 5 % of inertia, times the arm's `link_spread` (masses times at most 1.2)
+links     2 % of mass, 2 mm of centre, 5 % of inertia, times the arm's `link_spread` (masses times 0.8 to 1.2)
 friction  Coulomb (0.3–1.2 %; motor current 3.5–6 %) with a Stribeck peak of up to 10 % and two directions that differ
           by 15 % (1 sigma), viscous (0.05–0.15 % per rad/s; 3–5 %), offsets (0.25 %; 0.2 %)
 gears     motor current: a share of the torque is lost (3–7 %)
@@ -50,7 +50,7 @@ class World:
 
     def __init__(self, known: Arm, rng: np.random.Generator, without: str) -> None:
         n, effort, spread, motor = known.n, known.limits.effort, known.link_spread, known.motor_torque
-        self._rng, self._motor = rng, motor
+        self._rng = rng
         links = known.link_parameters * np.clip(1.0 + 0.02 * spread * rng.normal(size=(n, 1)), 0.8, 1.2)
         links[:, 1:4] += links[:, :1] * 0.002 * min(spread, 3.0) * rng.normal(size=(n, 3))
         links[:, 4:] *= 1.0 + 0.05 * min(spread, 4.0) * rng.normal(size=(n, 1))
