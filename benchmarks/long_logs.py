@@ -5,13 +5,12 @@
 kinds: mcap, db3 (ROS 2 bags), bag (ROS 1), parquet, hdf5, npz, csv. An empty Panda on an endless motion
 (`simulate_inverse`, a minute of it again and again, with noise of its own in each), without a tare. The peak is of all
 that one process touches (`ru_maxrss`), start-up included; the slope is that of a line through a kind's logs of a minute
-and more. What was measured stays in FOLDER/done.json: a later call goes on, with other kinds and lengths, too. Printed,
-and all of it written to benchmarks/results/long_logs.json and a table of docs/survey.md.
+and more. What was measured is kept in FOLDER/cells: a later call with the same code and rate goes on, with other kinds
+and lengths, too. Printed, and all of it written to benchmarks/results/long_logs.json and a table of docs/survey.md.
 """
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 import sys
@@ -26,6 +25,8 @@ import numpy as np
 from script import ROOT, markdown_table, options, say, write, write_table
 
 from armload import Recording, arm
+from armload.lab.cells import key_of, load_cells
+from armload.lab.experiment import Task, run_tasks, source_key
 from armload.motion import FourierMotion, random_motion
 from armload.simulation import Sensors, simulate_inverse
 
@@ -179,14 +180,19 @@ def main() -> None:
     asked = options(__doc__, kinds="mcap,parquet", seconds="10,60,600,3600", rate=1000.0, out="out/long-logs")
     folder = Path(asked.out)
     folder.mkdir(parents=True, exist_ok=True)
-    done = folder / "done.json"
-    found: list[dict[str, Any]] = json.loads(done.read_text(encoding="utf-8")) if done.exists() else []
-    for kind in asked.kinds.split(","):
-        for seconds in map(float, asked.seconds.split(",")):
-            if not any(one["kind"] == kind and one["log [s]"] == seconds for one in found):
-                found.append(measured(kind, seconds, asked.rate, folder))
-                done.write_text(json.dumps(found), encoding="utf-8")
-                say(str(found[-1]))
+    code = key_of(source_key(), source_key(__file__))
+
+    def key(kind: str, seconds: float) -> str:
+        return key_of(code, kind, seconds, asked.rate)
+
+    tasks = [
+        Task.of_one(f"{kind}-{seconds:g}", key(kind, seconds), measured, kind, seconds, asked.rate, folder)
+        for kind in asked.kinds.split(",")
+        for seconds in map(float, asked.seconds.split(","))
+    ]
+    run_tasks(tasks, folder / "cells", say=say)
+    cells = [c for c in load_cells(folder / "cells", []).values() if c["key"] == key(c["kind"], c["log [s]"])]
+    found = [{name: x for name, x in cell.items() if name not in ("name", "key")} for cell in cells]
     found.sort(key=lambda one: (list(KINDS).index(one["kind"]), one["log [s]"]))
     slopes = {}
     for kind in dict.fromkeys(one["kind"] for one in found):

@@ -4,13 +4,13 @@
 
 Arms, motions and boxes of `fleet.py`, each seed with one of every role, half a month after their tare. The same logs
 are answered as they are and with what is held sliding between two stops, `GAPS` either way, and `looseness` is asked.
-A log is cut where the payload truly changes. Finished arms are kept in FOLDER. Printed, and written to
+A log is cut where the payload truly changes. Finished arms are kept in FOLDER: run again with the same code, it goes
+on where it stopped. Printed, and written to
 benchmarks/results/loose_grippers.json and a table of docs/survey.md.
 """
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,9 @@ from script import ROOT, markdown_table, options, say, write, write_table
 
 from armload import arm
 from armload.identification.thresholds import SETTLED
+from armload.lab.cells import key_of
 from armload.lab.episodes.motion_kinds import MotionSource
+from armload.lab.experiment import Task, run_tasks, source_key
 from armload.simulation import Sensors, simulate_inverse
 from armload.survey.looseness import LOOSE, looseness
 from armload.survey.rows import of_slide
@@ -66,15 +68,14 @@ def of_arm(panda: Any, k: int, seed: int, logs: int) -> dict[str, Any]:
 
 def main() -> None:
     asked = options(__doc__, seeds="61,62,63", logs=30, out="out/loose-grippers")
-    folder, panda, arms = Path(asked.out), arm("panda"), []
-    folder.mkdir(parents=True, exist_ok=True)
-    for seed in map(int, asked.seeds.split(",")):
-        for k in range(ROLES):
-            cell = folder / f"{seed}-{k}-{asked.logs}.json"
-            if not cell.exists():
-                cell.write_text(json.dumps(of_arm(panda, k, seed, asked.logs)), encoding="utf-8")
-            arms.append(json.loads(cell.read_text(encoding="utf-8")))
-            say(str(arms[-1]))
+    code, panda = key_of(source_key(), source_key(__file__, Path(__file__).with_name("fleet.py"))), arm("panda")
+    tasks = [
+        Task.of_one(f"{seed}-{k}-{asked.logs}", key_of(code, seed, k, asked.logs), of_arm, panda, k, seed, asked.logs)
+        for seed in map(int, asked.seeds.split(","))
+        for k in range(ROLES)
+    ]
+    cells = run_tasks(tasks, asked.out, say=say)
+    arms = [{name: cell[name] for name in ("seed", "arm", "role", "of gaps")} for cell in cells.values()]
     rows, rates = [], {}
     for gap in GAPS:
         told = [one["of gaps"][f"{gap:g}"] for one in arms]

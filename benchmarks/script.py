@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from armload.lab.experiment import provenance, write_json
+from armload.runtime.atomic import replacing
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -98,4 +99,5 @@ def write_table(page: Path, name: str, text: str) -> None:
     )
     if count != 1:
         raise SystemExit(f"{page} has {count} places {marks[0]} … {marks[1]}: expected one")
-    page.write_text(new, encoding="utf-8")
+    with replacing(page) as temporary:
+        temporary.write_text(new, encoding="utf-8")

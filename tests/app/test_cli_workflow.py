@@ -206,6 +206,57 @@ def test_train_prints_errors_by_payload_and_by_row_beside_the_mean(work, call):
     assert (work / "net.safetensors").exists()
 
 
+@pytest.mark.full
+def test_a_training_of_networks_that_was_interrupted_goes_on_and_writes_the_same_model(
+    work, call, tmp_path, monkeypatch
+):
+    argv = (
+        "train",
+        "--dataset",
+        work / "data",
+        "--kind",
+        "network",
+        "--stages",
+        "2",
+        "--members",
+        "2",
+        "--epochs",
+        "3",
+    )
+    whole, stopped = tmp_path / "whole.safetensors", tmp_path / "stopped.safetensors"
+    told = call(*argv, "--out", whole).err
+    assert [line for line in told.splitlines() if "epoch" in line] == [
+        "armload: 1 of 3 epochs",
+        "armload: 3 epochs",
+    ] * 4
+    seen = []
+
+    def interrupt(at):
+        seen.append(at.done)
+        if len(seen) == 5:  # in the second stage of the first split
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("armload.app.cli.train.training_progress", lambda: interrupt)
+    call(*argv, "--out", stopped, code=130)
+    assert {path.name for path in tmp_path.glob("stopped*")} == {
+        "stopped.row.checkpoint.stage1.npz",
+        "stopped.row.checkpoint.stage2.npz",
+    }
+    refused = call(*argv, "--seed", "1", "--out", stopped, code=2)
+    assert "stopped.row.checkpoint.stage1.npz belongs to another training" in refused.err
+    assert "going on from its checkpoint" in call(*argv, "--out", stopped).err
+    assert seen[5:] == [3, 1, 2, 3, 1, 2, 3]
+    assert stopped.read_bytes() == whole.read_bytes()
+    assert [path.name for path in tmp_path.glob("stopped*")] == ["stopped.safetensors"]
+
+
+def test_a_build_whose_stderr_is_no_terminal_says_how_far_it_is(call, tmp_path):
+    told = call(
+        "dataset", "--out", tmp_path / "d", "--payloads", "random:2", "--rows", "20", "--sampler", "inverse"
+    ).err
+    assert told.splitlines() == ["armload: 0 of 2 runs", "armload: 2 runs"]
+
+
 def test_train_on_a_motion_of_a_file_needs_the_file(call, tmp_path):
     call("motion", "random", "--robot", "panda", "--seed", "4", "--out", tmp_path / "random.json")
     text = (tmp_path / "random.json").read_text()

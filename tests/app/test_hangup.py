@@ -99,6 +99,18 @@ def test_a_live_record_is_whole_whatever_ends_the_stream(in_a_terminal, tmp_path
     assert len(read_recording(record, arm("panda"))) > 0
 
 
+def test_a_benchmark_that_is_ended_leaves_nothing_of_its_cluster(in_a_terminal, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setenv("DASK_TEMPORARY_DIRECTORY", str(tmp_path / "scratch"))
+    process, _, noted, _ = in_a_terminal("benchmark", "--quick", "--out", tmp_path / "quick", "--cluster", "local")
+    noted("part 1 of 4")
+    assert list((tmp_path / "scratch").rglob("worker-*"))
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60.0) == 130
+    assert in_a_terminal.noted()[-1] == "armload: interrupted"
+    assert not any(path.is_dir() for path in (tmp_path / "scratch").rglob("worker-*"))
+
+
 def test_a_service_whose_terminal_is_closed_saves_and_ends(in_a_terminal, tmp_path):
     process, hang_up, _, said = in_a_terminal("serve", "sim", "--method", "map", "--save", tmp_path / "state")
     said('"known": true')

@@ -360,9 +360,11 @@ def test_nothing_finished_is_nothing_written(tmp_path):
     assert not (tmp_path / "a.json").exists()
 
 
-def test_cells_of_another_experiment_in_the_folder_are_passed_over(tmp_path):
+def test_cells_of_another_experiment_or_version_in_the_folder_are_passed_over(tmp_path):
     save_cell(tmp_path, {"name": "tree-1stage-raw-row-ideal-s0", "key": "of the study", "spec": {}})
     save_cell(tmp_path, {"name": "no key"})
+    of_before = {"population": "untared", "seed": 1, "row": {"name": "rls", "method": "rls", "tared": False, "more": 1}}
+    save_cell(tmp_path, {"name": "untared-1-rls", "key": "of another version", **of_before})
     size = replace(QUICK, populations=("untared",), methods=("rls-filter",))
     assert run_benchmark(size, tmp_path, until=-1.0) == {}
 

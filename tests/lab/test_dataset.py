@@ -204,6 +204,28 @@ def test_a_build_stopped_at_any_file_ends_in_the_same_data_set(dataset, request_
         assert build_dataset(folder, **request_).hash == dataset.hash
 
 
+def test_of_two_builds_in_one_folder_the_first_finishes_it_for_both(dataset, request_, tmp_path, monkeypatch):
+    real, calls = build.simulate_many, []
+
+    def overtaken(robot, runs, **options):
+        calls.append(len(runs))
+        if len(calls) == 2:  # the other build takes the first part, makes the rest, and takes the parts away
+            assert build_dataset(tmp_path / "set", **request_).hash == dataset.hash
+        return real(robot, runs, **options)
+
+    monkeypatch.setattr(build, "simulate_many", overtaken)
+    assert build_dataset(tmp_path / "set", **request_).hash == dataset.hash
+    assert calls == [3, 3, 3, 3, 3]
+    assert sorted(p.name for p in (tmp_path / "set").iterdir()) == ["provenance.json", "table.parquet"]
+
+
+def test_parts_that_a_kill_has_left_beside_a_finished_data_set_go(dataset, request_, copy):
+    (copy / "parts").mkdir()
+    (copy / "parts" / "runs-000000-000002.parquet").write_bytes(b"PAR1")
+    assert build_dataset(copy, **request_).hash == dataset.hash
+    assert sorted(p.name for p in copy.iterdir()) == ["provenance.json", "table.parquet"]
+
+
 def test_a_damaged_part_is_built_again(dataset, request_, tmp_path, monkeypatch):
     monkeypatch.setattr(build, "_finish", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
@@ -328,13 +350,13 @@ def test_a_run_that_does_not_exist_is_refused(dataset):
         dataset.recording(12)
 
 
-def test_the_progress_bar_keeps_stdout_clean(request_, tmp_path, capsys):
-    small = {**request_, "worlds": None, "motions": request_["motions"][:1], "progress": True}
-    build_dataset(tmp_path / "set", **small)
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert "simulating panda" in err
-    assert "3/3" in err
+def test_progress_counts_the_runs_and_its_bar_leaves_the_standard_output_alone(request_, tmp_path, capsys):
+    small = {**request_, "worlds": None, "motions": request_["motions"][:1]}
+    seen = []
+    build_dataset(tmp_path / "told", **{**small, "progress": seen.append})
+    assert [(at.label, at.done, at.total) for at in seen] == [("simulating panda", k, 3) for k in (0, 3)]
+    build_dataset(tmp_path / "shown", **{**small, "progress": True})
+    assert capsys.readouterr().out == ""
 
 
 def test_an_arm_with_six_joints_gets_29_columns(tmp_path):

@@ -1,4 +1,4 @@
-"""Progress of a long training, and a bar that shows it."""
+"""Progress of a long training, or of what it learns from, and a bar that shows it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Progress(NamedTuple):
-    """Where a training stands: `done` of at most `total` steps (trees grown, or epochs), and a note."""
+    """Where it stands: `done` of at most `total` steps (trees grown, epochs, or runs simulated), and a note."""
 
     label: str
     done: int
@@ -21,7 +21,7 @@ Report = Callable[[Progress], None]
 
 @contextmanager
 def reporter(progress: bool | Report | None) -> Iterator[Report]:
-    """The function a training calls: silence (None, False), a bar on the standard error stream (True), or your own."""
+    """The function that is told: silence (None, False), a bar on the standard error stream (True), or your own."""
     if callable(progress):
         yield progress
     elif not progress:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from armload.app.cli.arguments import Parser, add_arm_arguments, add_cluster_argument, at_least, output_folder
 from armload.app.cli.named import arm_of, motion_of, payload_named, whole_number, world_of
+from armload.app.cli.progress import progress_shown
 
 _EXAMPLES = """\
 examples:
@@ -80,17 +80,18 @@ def run(options: argparse.Namespace) -> None:
             payloads += random_payloads(whole_number(name, "payloads"), options.seed)
         else:
             payloads.append(payload_named(name, arm))
-    dataset = build_dataset(
-        options.out,
-        arm,
-        [motion_of(name, arm) for name in options.motion],
-        payloads,
-        worlds=[world_of(name, arm) for name in options.world],
-        sensors=Sensors.of(arm) if options.noise else None,
-        rows_per_run=options.rows,
-        seed=options.seed,
-        progress=sys.stderr.isatty(),
-        cluster=options.cluster,
-        sampler=options.sampler,
-    )
+    with progress_shown("run") as show:
+        dataset = build_dataset(
+            options.out,
+            arm,
+            [motion_of(name, arm) for name in options.motion],
+            payloads,
+            worlds=[world_of(name, arm) for name in options.world],
+            sensors=Sensors.of(arm) if options.noise else None,
+            rows_per_run=options.rows,
+            seed=options.seed,
+            progress=lambda at: show(at.done, at.total),
+            cluster=options.cluster,
+            sampler=options.sampler,
+        )
     print(f"{options.out}: {dataset}")

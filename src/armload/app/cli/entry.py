@@ -6,7 +6,7 @@
 | 1         | a bug in armload                                          |            | one line, with a hint         |
 | 2         | the input or the usage is wrong                           | empty      | one sentence that names where |
 | 3         | `motion check`: the arm may not run it, a limit is passed | the answer | notes                         |
-| 130       | interrupted                                               |            | one line                      |
+| 130       | interrupted: by Ctrl-C, SIGTERM or a closed terminal      |            | one line                      |
 | 141       | nobody reads the output any more (`armload … | head -1`)  |            | nothing                       |
 
 Each command is a module of this package with `parser()` and `run(arguments)`; it is imported when it is asked for, and
@@ -32,7 +32,7 @@ from armload.app.cli.outputs import check_outputs
 from armload.app.cli.printing import drop_unwritten, on_one_line, print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import missing
-from armload.runtime.interruption import ended_by_hangup
+from armload.runtime.interruption import ended_by_hangup, ended_by_sigterm
 from armload.runtime.version import __version__
 
 COMMANDS = {
@@ -87,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal that cannot show "m²" still gets the answer
         elif stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")  # nor does a file's name that is no UTF-8 stop it
-    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost(), ended_by_hangup():
+    with warnings.catch_warnings(), _notes_on_stderr(), _no_interruption_lost(), ended_by_hangup(), ended_by_sigterm():
         warnings.showwarning = _show_warning
         code = _guarded(arguments, show_traceback)
     drop_unwritten()  # reported already; the interpreter flushes once more when it ends

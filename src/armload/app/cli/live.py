@@ -25,7 +25,7 @@ from armload.app.cli.named_logs import columns_for, columns_of, read_logs
 from armload.app.cli.outputs import check_output
 from armload.app.cli.printing import notes_aside, print_note
 from armload.errors import ArmloadError, UsageError
-from armload.runtime.interruption import ended_by_sigterm, held_back
+from armload.runtime.interruption import held_back
 
 if TYPE_CHECKING:
     from armload.arms import Arm
@@ -193,7 +193,7 @@ def run(options: argparse.Namespace) -> int | None:
     age, aged = age_of(tare, began, options.tare_age)
     for note in aged:
         _warn(note)
-    with notes_aside(), ended_by_sigterm(), Steadied(source) if options.steady else source as source:
+    with notes_aside(), Steadied(source) if options.steady else source as source:
         recorder = Recorder(mcap, arm.n, arm.joint_names) if mcap else None
         more = {"known": known, "recorder": recorder, "tare_age": age}
         session = Session(source, arm, tare, options.method, _warn, profile, **more)

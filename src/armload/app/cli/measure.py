@@ -16,7 +16,7 @@ from armload.app.cli.named import arm_of, boxes_of, motion_of, part_of, payload_
 from armload.app.cli.named_logs import read_logs
 from armload.app.cli.printing import print_json, print_note, working, write_json
 from armload.errors import MotionError, SafetyError, SentError, SinkError, UsageError
-from armload.runtime.interruption import ended_by_sigterm, held_back
+from armload.runtime.interruption import held_back
 
 __all__ = ["parser", "run"]
 
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int | None:
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
     heaviest = Basis(**known).heaviest
     simulated = {} if options.source != "sim" else _simulated(options, arm, motion, heaviest, loaded=tare is not None)
-    with ended_by_sigterm(), open_mover(options.source, arm, **simulated) as mover:
+    with open_mover(options.source, arm, **simulated) as mover:
         if motion is None:
             motion = _designed(arm, mover.commanded(), profile, heaviest, options)
         if options.apply and not mover.writes:

@@ -6,10 +6,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from armload.app.cli.printing import counted, print_note
 
+if TYPE_CHECKING:
+    from armload.ensembles.progress import Progress, Report
+
 _EVERY = 10.0  # [s] between two lines
+_STEPS = {"trees": "tree", "networks": "epoch"}  # by the label of a training
 
 
 @contextmanager
@@ -29,10 +34,24 @@ def progress_shown(what: str, then: str = "") -> Iterator[Callable[[int, int], N
         yield lambda done, total: report(Progress(f"{what}s", done, total, "" if done < total else then))
 
 
+def training_progress() -> bool | Report:
+    """What shows the training of an ensemble in the same way; `fit(…, progress=…)` takes it."""
+    if sys.stderr.isatty():
+        return True
+    lines: dict[str, _Lines] = {}
+
+    def show(at: Progress) -> None:
+        if at.done == 1 or at.label not in lines:  # each stage begins anew
+            lines[at.label] = _Lines(_STEPS.get(at.label, "step"))
+        lines[at.label](at.done, at.total)
+
+    return show
+
+
 class _Lines:
     """Progress as lines on stderr: at the beginning, at the end and every now and then."""
 
-    def __init__(self, what: str, then: str) -> None:
+    def __init__(self, what: str, then: str = "") -> None:
         self._what, self._then = what, then
         self._first: tuple[int, float] | None = None
         self._last = 0.0

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
+from glob import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, output_file, output_folder
 from armload.app.cli.named import arm_of_dataset, motion_of
 from armload.app.cli.printing import print_note, print_table
+from armload.app.cli.progress import training_progress
 from armload.errors import UsageError
 
 if TYPE_CHECKING:
@@ -37,7 +39,8 @@ held on episodes left out.
 
 Errors of an ensemble are printed for two splits: by payload (whole payloads held out: what to expect of a new one) and
 by row (as in the paper: neighbours of every test row are in training, so it measures memory). The model written learnt
-from the training part of --split.
+from the training part of --split. An interrupted training of networks goes on from NAME.SPLIT.checkpoint….npz beside
+--out NAME.safetensors, which go when it has ended.
 """
 
 # What each method's own options are when they are not given; the other method refuses them.
@@ -175,9 +178,10 @@ def _run_ensemble(options: argparse.Namespace) -> None:
     for name in sorted(splits, key=lambda name: name == options.split):  # the one to save last
         split = splits[name](dataset, options.seed)
         model = _untrained(options)
-        print_note(f"training on {len(split.train)} rows, split by {name}")
+        found = any(_checkpoints(options.out, name))
+        print_note(f"training on {len(split.train)} rows, split by {name}{', going on from its checkpoint' * found}")
         (X, y), (Xv, yv) = ((dataset.X[part], dataset.y[part]) for part in (split.train, split.validation))
-        model.fit(X, y, Xv, yv, progress=sys.stderr.isatty())
+        model.fit(X, y, Xv, yv, progress=training_progress(), checkpoint=_checkpoint(options.out, name))
         if name == "payload":
             error_std = held_out_error(model, dataset, split.test)
         rows += _errors(name, model, y.mean(axis=0), dataset.X[split.test], dataset.y[split.test])
@@ -191,8 +195,21 @@ def _run_ensemble(options: argparse.Namespace) -> None:
         error_std=error_std,
         notes=f"split by {options.split}",
     )
+    for left in [file for name in splits for file in _checkpoints(options.out, name)]:
+        left.unlink(missing_ok=True)
     print_table(_table(saved.kind, rows, options))
     print(f"wrote {options.out}: {saved.compiled.n_members} members, split by {options.split}, about {saved.frame}")
+
+
+def _checkpoint(out: str, split: str) -> Path:
+    """Where the training of networks on a split stands, beside the model that is to be written."""
+    return Path(out).with_name(f"{Path(out).stem}.{split}.checkpoint.npz")
+
+
+def _checkpoints(out: str, split: str) -> list[Path]:
+    """Those there are: each stage or part of an ensemble has one."""
+    named = _checkpoint(out, split)
+    return list(named.parent.glob(f"{escape(named.stem)}*{named.suffix}"))
 
 
 def _untrained(options: argparse.Namespace) -> BaggingEnsemble | TwoStage | MixedEnsemble:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from armload.lab.experiment import Cells, Task, listed, run_tasks
 FORMAT = 1  # of a cell; a change makes every cell unfinished
 TIMES = (0.02, 0.1, 0.5, 1.0, 3.0, 6.0)  # [s] since the run began
 FIRST_SEED = 900_001  # of the episodes: nothing is trained on it or on those that follow
-_IN_EVERY_CELL = {"population", "seed", "row"}
+_IN_EVERY_CELL, _OF_ROW = {"population", "seed", "row"}, {field.name for field in fields(Row)}
 _REPEATED = 3  # arms and payloads whose repeatability is measured, at most
 
 
@@ -120,13 +120,18 @@ def run_benchmark(
         jobs, cluster, until, say: see `run_tasks`.
     """
     robot = arm(size.robot)
-    # of other experiments there may be some, too; which are damaged `run_tasks` says
-    cells = {name: cell for name, cell in load_cells(folder, []).items() if cell.keys() >= _IN_EVERY_CELL}
+    # of other experiments and versions there may be some, too; which are damaged `run_tasks` says
+    cells = {name: cell for name, cell in load_cells(folder, []).items() if _of_benchmark(cell)}
     say("checking what is finished")
     wanted = {name: rows_for(population(name), size.methods) for name in size.populations}
     valid = keys(size, robot, _with_finished(cells, wanted))
     others = {name: cell for name, cell in cells.items() if cell.get("key") == valid.get(name, "")}
     return others | run_tasks(_tasks(size, wanted, valid), folder, jobs=jobs, cluster=cluster, until=until, say=say)
+
+
+def _of_benchmark(cell: dict[str, Any]) -> bool:
+    """Whether a cell is one of this experiment, of a version whose rows are told by the same fields."""
+    return cell.keys() >= _IN_EVERY_CELL and isinstance(cell["row"], dict) and cell["row"].keys() == _OF_ROW
 
 
 def _with_finished(cells: Cells, wanted: dict[str, list[Row]]) -> dict[str, list[Row]]:

@@ -2,15 +2,15 @@
 
 While it is being built the folder holds `provenance.json` (without a hash) and `parts/`, one file per batch of runs.
 Each file appears whole or not at all, so that a build may be stopped at any moment and started again. At the end come
-`table.parquet` and the hash in `provenance.json`, and the parts go.
+`table.parquet` and the hash in `provenance.json`, and the parts go. Two builds of the same data set in one folder take
+each other's parts; whoever is first finishes it for both.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armload.arms import Arm
+from armload.ensembles.progress import Progress, Report, reporter
 from armload.errors import DatasetError
 from armload.lab.dataset.parquet_table import IDENTITIES, Dataset, content_hash, open_dataset, read_table, table_columns
 from armload.lab.dataset.provenance import (
@@ -55,7 +56,7 @@ def build_dataset(
     sensors: Sensors | None = None,
     rows_per_run: int = ROWS_PER_RUN,
     seed: int = 0,
-    progress: bool = True,
+    progress: bool | Report = True,
     cluster: str | None = None,
     sampler: str = SAMPLERS[0],
 ) -> Dataset:
@@ -71,7 +72,7 @@ def build_dataset(
         sensors: None: ideal. Rows stay evenly spaced and complete: jitter and lost samples are switched off.
         rows_per_run: samples kept of each run.
         seed: of the sensors' noise, which differs from run to run.
-        progress: show a bar on stderr.
+        progress: show a bar on stderr; or a function called with a `Progress` after every part.
         cluster: where the runs are simulated, as of `armload.lab.engine.engine`; its workers see the folder.
         sampler: mujoco, an arm under its controller (`simulate`); or inverse, a hundred times faster: an arm that
             follows its motion but for a drawn tracking error (`simulate_inverse`).
@@ -89,6 +90,7 @@ def build_dataset(
     provenance = provenance_of(arm, motions, payloads, worlds, sensors, rows_per_run, seed, sampler)
     try:
         if _claim(folder, provenance):
+            _remove_parts(folder)  # of a build that was stopped between the hash and this
             return open_dataset(folder)
         runs = _runs(motions, payloads, worlds, sensors, seed)
         batches = [
@@ -99,6 +101,9 @@ def build_dataset(
         _build_parts(folder, provenance, arm, runs, batches, progress, cluster)
         _finish(folder, provenance, batches)
     except OSError as error:
+        if _finished(folder, provenance):  # by another build, which took the parts away
+            _remove_parts(folder)
+            return open_dataset(folder)
         raise DatasetError(
             f"{folder} cannot be written ({error.strerror or error}): free some space or choose another folder, then "
             "build again; it goes on where it was"
@@ -164,7 +169,7 @@ def _build_parts(
     arm: Arm,
     runs: list[tuple[Run, Payload, int, int, int]],
     batches: list[range],
-    progress: bool,
+    progress: bool | Report,
     cluster: str | None,
 ) -> None:
     def missing() -> Iterator[tuple[range, list[tuple[Run, Payload, int, int, int]]]]:
@@ -173,8 +178,9 @@ def _build_parts(
                 yield batch, [runs[k] for k in batch]
 
     (folder / _PARTS).mkdir(exist_ok=True)
-    with _bar(progress, len(runs), f"simulating {arm.name}") as advance:
-        advance(len(runs) - sum(len(batch) for batch, _ in missing()))
+    with reporter(progress) as report:
+        done = len(runs) - sum(len(batch) for batch, _ in missing())
+        report(Progress(f"simulating {arm.name}", done, len(runs)))
         with engine(1 if cluster is None else os.cpu_count() or 1, cluster) as on:
             for (batch, _), written in on.each(partial(_write_part, folder, provenance, arm), missing):
                 if written is None:
@@ -182,7 +188,8 @@ def _build_parts(
                         f"the process that simulated runs {batch.start} to {batch.stop - 1} was killed each time: "
                         "expected it to end; build again on workers with more memory"
                     )
-                advance(len(batch))
+                done += len(batch)
+                report(Progress(f"simulating {arm.name}", done, len(runs)))
 
 
 def _write_part(
@@ -263,23 +270,22 @@ def _finish(folder: Path, provenance: dict[str, Any], batches: list[range]) -> N
 
         sha256 = content_hash(provenance, written())
     write_provenance(folder, {**provenance, "sha256": sha256})
-    shutil.rmtree(folder / _PARTS)
+    _remove_parts(folder)
+
+
+def _finished(folder: Path, provenance: dict[str, Any]) -> bool:
+    """Whether the folder holds this data set, with its hash."""
+    try:
+        found = read_provenance(folder)
+    except DatasetError:
+        return False
+    return bool(found["sha256"]) and not differences(provenance, found)
+
+
+def _remove_parts(folder: Path) -> None:
+    """Away with the parts of a finished data set; another build may be doing so, too."""
+    shutil.rmtree(folder / _PARTS, ignore_errors=True)
 
 
 def _part(folder: Path, batch: range) -> Path:
     return folder / _PARTS / f"runs-{batch[0]:06d}-{batch[-1]:06d}.parquet"
-
-
-@contextmanager
-def _bar(show: bool, total: int, label: str) -> Iterator[Callable[[int], None]]:
-    """A function to call with the number of runs done since the last call; it draws on stderr."""
-    if not show:
-        yield lambda _: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"))
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda done: bar.advance(task, done)

@@ -76,7 +76,7 @@ def train(spec: Spec, basis: Basis, progress: bool = False) -> Trained:
     about = {"dataset_hash": dataset.hash, "payloads": dataset.payload[np.r_[split.train, split.validation]]}
     save_model(file, model, arm=basis.arm, motion=basis.motion, notes=spec.name, **about)
     for left in checkpoint.parent.glob(f"{spec.name}.*"):
-        left.unlink()
+        left.unlink(missing_ok=True)  # another run of the study may have trained the same
     epochs = None if model.epochs_ is None else np.ravel(model.epochs_).tolist()
     return Trained(lambda X: model.predict(seen(X)), epochs, file.stat().st_size, *_errors(model, seen, dataset, split))
 
