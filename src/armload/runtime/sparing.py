@@ -56,7 +56,7 @@ def whole(data: NDArray[np.uint8], how: How) -> NDArray:
     bits[np.unpackbits(data[:first], count=count).view(bool)] = data[first:].view(kind)
     bits = bits.reshape(shape)
     if what == _LOWER:
-        bits |= np.tril(bits, -1).swapaxes(-1, -2)
+        bits = np.bitwise_or(bits, np.tril(bits, -1).swapaxes(-1, -2))
     elif what == _CHANGED:
         bits = np.bitwise_xor.accumulate(bits, axis=0)
     return bits.view(dtype)
