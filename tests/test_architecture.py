@@ -214,6 +214,7 @@ CAUGHT = {
     "recording/spooled.py",
     "runtime/lazy.py",
     "runtime/packing.py",
+    "runtime/sparing.py",
     "runtime/real_numbers.py",
     "survey/table_file.py",
 }

@@ -209,3 +209,35 @@ def test_without_a_profile_nothing_is_learned(panda):
     with pytest.raises(IdentificationError, match="without a profile"):
         stream.learned()
     stream.close()
+
+
+@pytest.mark.parametrize("tared", [False, True])
+@pytest.mark.full  # twenty seconds
+def test_a_state_goes_on_exactly_without_having_the_profile_in_it(panda, world, profile, logs, tared, tmp_path):
+    """Also as what it teaches the profile, and where it begins anew later."""
+    about = (random_motion(panda, 3, duration=8.0), [(4.0, draw_payload("boxes", 5, rated=3.0))])
+    sensors = {"world": world, "sensors": Sensors.panda(panda), "rate": 100.0, "speed": None}
+    with Simulator(panda, *about, duration=9.0, seed=5, **sensors) as source:
+        samples = list(source)
+    first = OnlineIdentifier(panda, logs[0] if tared else None, profile=profile)
+    streams, sizes = [first], {}
+    for k, sample in enumerate(samples):
+        answers = [one.update(*sample) for one in streams]
+        for answer in answers[1:]:
+            assert np.array_equal(answer.phi, answers[0].phi)
+            assert np.array_equal(answer.covariance, answers[0].covariance)
+        if k in (5, 150, 420, 700):  # the first moments; one run; a hand-over; a run and the one before it
+            path = first.save(tmp_path / "state.npz")
+            sizes[k] = path.stat().st_size
+            streams.append(OnlineIdentifier.restore(path, panda, profile=profile))
+    assert first.event is not None
+    assert sizes[150] < (1.6 if tared else 1.0) * profile.A.nbytes
+    taught = [one.learned("today") for one in streams]
+    assert len({None if one is None else one.digest for one in taught}) == 1
+    for one in streams:
+        one.reset()
+    for sample in samples[:100]:
+        again = [one.update(*sample) for one in streams]
+        assert all(np.array_equal(one.phi, again[0].phi) for one in again)
+    for one in streams:
+        one.close()

@@ -29,8 +29,17 @@ def test_memory_and_processor_time_are_the_committed_results():
     assert f"{slope:+.1f} ± {half:.1f} MB an hour" in PAGE
     assert f"{100 * changing['share of a core']:.1f} % of a core where the payload changes" in PAGE
     assert f"{100 * steady['share of a core']:.1f} % where it stays the same" in PAGE
-    assert f"takes {steady['state, mean [MB]']:.0f} MB while the payload stays the same" in PAGE
-    assert f"{changing['state, mean [MB]']:.0f} MB in the mean where it changes every 15 s" in PAGE
+
+
+def test_what_a_saved_state_takes_is_the_committed_result():
+    cases = json.loads((RESULTS / "saved_states.json").read_text())["cases"]
+    for known, words in (("nothing", "With the default method"), ("profile", "With a profile")):
+        steady, changing = (cases[f"{known}, {held}"]["mean [MB]"] for held in ("steady", "changing"))
+        assert (
+            f"{words} a Panda's takes {steady:.0f} MB while the payload stays the same, and {changing:.0f} MB" in PAGE
+        )
+    slowest = (max(case[f"{what} [s]"] for case in cases.values()) for what in ("saving", "going on"))
+    assert "To save one took {:.2f} s at most, to go on from one {:.2f} s".format(*slowest) in PAGE
 
 
 def test_what_a_spare_process_takes_is_the_committed_result():

@@ -1,6 +1,6 @@
 """The state of a live identifier in one file: saved, and taken up again by another process as if nothing had been.
 
-It refers to the arm and to the trained model, has neither in it, and is refused for others.
+It refers to the arm, to the trained model and to the profile, has none of them in it, and is refused for others.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from armload.runtime.content import digest_of_numbers
 from armload.runtime.packing import Packer, Unpacker
 from armload.runtime.regular import check_regular
 
-FORMAT = 30
+FORMAT = 31
 
 
 def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, method: str, engine: Identifier) -> Path:
@@ -94,9 +94,9 @@ def _opened(path: str | PathLike[str]) -> Iterator[tuple[dict[str, Any], Any]]:
 
 
 def _known(arm: Arm, engine: Identifier) -> dict[str, Any]:
-    """What a new identifier for the same arm has already: the arm and the trained parts."""
-    parts = {name: value for name in ("model", "_payloads", "profile") if (value := getattr(engine, name, None))}
-    return {"arm": arm, **parts}
+    """What a new identifier for the same arm has already: the arm, the trained parts, and what the profile says."""
+    names = ("model", "_payloads", "profile", "of_profile")
+    return {"arm": arm, **{name: value for name in names if (value := getattr(engine, name, None))}}
 
 
 def _origin(arm: Arm, method: str, engine: Identifier) -> dict[str, Any]:

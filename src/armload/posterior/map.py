@@ -58,6 +58,7 @@ class PosteriorLeastSquares(Identifier):
 
     Attributes:
         reference: an earlier run of the stream with the same mounted as at the tare; it is a tare, too.
+        of_profile: the profile as a run, made of nothing else; None: there is no profile.
         fresh: whether the last update brought a new answer. data_t: time of the newest sample in the answer [s].
     """
 
@@ -99,11 +100,13 @@ class PosteriorLeastSquares(Identifier):
         self.reference: PosteriorLeastSquares | None = None
         self._stream: StreamingPosterior | None = None
         self._tares: list[RegressionData] = []
+        self.of_profile: RegressionData | None = None
         self._start: Scales | None = None
         self._tare_time = 0.0 if tare is None else tare.duration
         if profile is not None:
             profile.check(arm)
-            self._tares.append(profile.data(self._correction, gain, self._noise.block))
+            self.of_profile = profile.data(self._correction, gain, self._noise.block)
+            self._tares.append(self.of_profile)
             self._start = profile.start(self._correction)
             self._tare_time += profile.duration
             self.session = profile.session(self._correction)

@@ -50,7 +50,7 @@ class SequentialPosterior:
 
     C (n, R, R), own (n, R), slope (n, R, 10 + m): of the joints' own weights; C and slope are made single. shared_C
     (m, m), shared_own (m,), shared_slope (m, 10): of what the joints share, s = [tares' payloads, eta]. Of C and
-    shared_C only the lower triangles count: half of what a row reads and writes. information Λ (10, 10), vector h
+    shared_C only the lower triangles are kept: half of what a row reads and writes. information Λ (10, 10), vector h
     (10,).
     noise: S (n,) [N²·m²·s]. tares: payloads of runs before this one, which the rows carry too: 0 or 1. drifts: how many
     unknowns of eta, the first ones, have a deviation of this session, which follows eta in s.
@@ -87,7 +87,7 @@ class SequentialPosterior:
         n, R, Z = self.slope.shape
         self.late, self.waiting = np.zeros((n, _LATE, R + Z), np.float32), np.zeros(1, dtype=np.int64)
         self.slope = np.ascontiguousarray(np.take_along_axis(self.slope, self.order[:, None], axis=2), np.float32)
-        self.C = np.ascontiguousarray(self.C, np.float32)
+        self.C, self.shared_C = np.tril(self.C).astype(np.float32), np.tril(self.shared_C)
 
     def take(self, row: Row) -> None:
         """Condition on one row of each joint."""

@@ -75,7 +75,8 @@ class StreamingPosterior:
         self.tares, self.gain, self.start = tuple(tares), gain, start
         self._regression = self.regression()
         self._whole = whole_noise(correction, self.noise)
-        self._base: SequentialPosterior | None = None
+        self._base: SequentialPosterior | None = None  # in the first moments: before any row
+        self._first: Posterior | None = None
         self._accumulation = Accumulation(self._empty(), same_motion)
         self._pooling, self._looked = Pooling(together), Pooling(together)
         self.reset()
@@ -106,27 +107,36 @@ class StreamingPosterior:
 
     def prepare(self) -> None:
         """Do now what the first answer would have to wait for: the posterior of the tares alone."""
+        if self._early is not None:
+            self._begun()
+
+    def _begun(self) -> SequentialPosterior:
+        """The state before any row; made again where it has been left, as the tares are what they were."""
         if self._base is None:
             first = self._solver.solve([*self.tares, self._empty()], self.start, 1)
             self._first, self._base = first.posterior, first.state
             self._whole = first.posterior.scales.noise[-1] / share_of_noise(0.0)  # as the tares show it
             self._base.noise = self._whole
+        return self._base
 
     @property
     def posterior(self) -> Posterior:
         """The last full solution: of the tares alone before there was one."""
-        if self._posterior is None:
-            self.prepare()
-            return self._first
-        return self._posterior
+        return self._of_tares if self._posterior is None else self._posterior
+
+    @property
+    def _of_tares(self) -> Posterior:
+        if self._first is None:
+            self._begun()
+        assert self._first is not None
+        return self._first
 
     def allow_for_sticking(self, variance: NDArray[np.float64]) -> None:
         """Joints at rest are held by friction of this variance (n,) [N²·m²]: the next rows weigh less while they are.
 
         Of a block of rows, in units of the noise expected of one: never less than is expected of any arm.
         """
-        self.prepare()
-        noise = self._first.scales.noise[-1] / self.noise.block
+        noise = self._of_tares.scales.noise[-1] / self.noise.block
         self._regression.presliding[:] = np.maximum(self.correction.presliding, variance / noise)
         self._allows = None
 
@@ -161,7 +171,7 @@ class StreamingPosterior:
             self._early_is_old = True
             if self.seconds >= MOMENT:
                 self._from_early()
-                self._early = None
+                self._early = self._base = None
         else:
             assert self._state is not None
             self._state.take(row)
@@ -239,8 +249,7 @@ class StreamingPosterior:
         """The state of a run so short that the residual shows one value: with less noise the shorter it is."""
         if self._early is None or not self._early_is_old:
             return
-        assert self._base is not None
-        self._state = self._base.copy()
+        self._state = self._begun().copy()
         self._state.noise = self._whole * share_of_noise(self.seconds)
         for row in self._early:
             self._state.take(row)
@@ -269,9 +278,7 @@ class StreamingPosterior:
             self.another = found_so_far(self.another, solution.another)
             self.restlessness, self.without_tare = solution.restlessness, solution.without_tare
         elif self._state is None:
-            self.prepare()
-            assert self._base is not None
-            self._state = self._base.copy()
+            self._state = self._begun().copy()
 
     def _take_waiting(self) -> None:
         """Accumulate rows that wait for others, as none will come soon: the next solution knows them."""

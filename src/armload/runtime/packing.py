@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.runtime.sparing import spared, whole
+
 _PACKAGE = "armload."
 _NOT_PACKED = ("_tasks", "_data", "_model")  # threads, and what Pinocchio makes anew
 _GROUPS = {kind.__name__: kind for kind in (list, deque, tuple)}
@@ -54,8 +56,10 @@ class Packer:
         kind = type(value)
         name = f"{kind.__module__}.{kind.__qualname__}"
         if isinstance(value, np.ndarray | np.generic):
-            self.arrays.append(np.asarray(value))
-            return ["array", len(self.arrays) - 1, isinstance(value, np.generic), not value.flags.writeable]
+            about = isinstance(value, np.generic), not value.flags.writeable
+            data, how = spared(array := np.asarray(value)) or (array, None)
+            self.arrays.append(data)
+            return ["array", len(self.arrays) - 1, *about, how]
         if isinstance(value, dict):
             return ["dict", [[self.node(k), self.node(v)] for k, v in value.items()]]
         if kind.__name__ in _GROUPS or (isinstance(value, tuple) and name.startswith(_PACKAGE)):
@@ -93,7 +97,8 @@ class Unpacker:
 
     def _make(self, index: int, what: str, name: Any, *held: Any) -> Any:
         if what == "array":
-            array, (scalar, fixed) = self._arrays[name], held
+            array, (scalar, fixed, how) = self._arrays[name], held
+            array = array if how is None else whole(array, how)
             array.setflags(write=not fixed)
             return array[()] if scalar else array
         if what == "group" and name not in ("list", "deque"):

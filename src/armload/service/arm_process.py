@@ -35,6 +35,7 @@ from armload.service.absence import Absence
 from armload.service.catching_up import CatchingUp
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
+from armload.service.old_states import OldStates
 from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
 from armload.service.session import TICK, Session
@@ -58,6 +59,7 @@ class ArmProcess:
         # alarms, and whoever asks the endpoint, need to know at any moment
         self.settings, self.every, self._reader = settings, min(every, TICK), None
         self._state = settings.state  # of the files as they are now: one written anew is not what the stream goes by
+        self._others = OldStates(self._state, SESSION, self.note)
         self._told = self._saved = -float("inf")
         self._kept: float | None = None  # when the state that is there was saved [s, monotonic]
         self._continued = False  # whether it goes on from a state
@@ -217,6 +219,7 @@ class ArmProcess:
         path = self._state
         if path is not None:
             clear_left_over(path)
+            self._others.clear(time.monotonic())
         if path is None or not path.exists():
             return None
         try:
@@ -238,6 +241,7 @@ class ArmProcess:
 
     def _save(self, session: Session) -> None:
         self._saved, path = time.monotonic(), self._state
+        self._others.clear(self._saved)
         if path is None or session.sample is self._newest:  # what was not seen since is not of now
             return
         try:

@@ -20,6 +20,7 @@ from armload.recording.growing_file import RECORDS
 from armload.service.access import is_loopback, read_token
 from armload.service.idle import check_arm, check_service
 from armload.service.mqtt import checked
+from armload.service.old_states import state_file
 from armload.service.webhook import check_webhook
 
 if TYPE_CHECKING:
@@ -135,8 +136,7 @@ class ArmSettings(ArmOptions, KnownOptions):
         for key in ("tare", "profile", "tool", "body"):
             if asked.get(key) is not None and ((path := Path(asked[key])).is_file() or path.is_dir()):
                 asked[key] = [asked[key], _digest(path)]
-        digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
-        return Path(self.save) / f"{self.name}-{digest}.npz"
+        return state_file(self.save, self.name, asked)
 
     def mounted_on(self, bare: Arm) -> InertialParameters | None:
         """What is on the flange that answers lack; None: nobody says.
