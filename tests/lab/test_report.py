@@ -20,7 +20,7 @@ from armload.lab.evaluation import Comparison, EvaluationRun, Table
 from armload.lab.report import ReportError, Section, answer_section, default_report, render, write_report
 from armload.lab.report import comparison_figures as figures
 from armload.lab.report import recording_figures as recordings
-from armload.lab.report.style import method_styles
+from armload.lab.report.style import look, method_styles
 from armload.motion import taie2024
 from armload.regression import first_order_lag
 from armload.simulation import simulate
@@ -252,6 +252,18 @@ def test_one_method_far_off_does_not_flatten_the_rest():
     labels = [t.get_text() for t in figures.parameter_over_time(c).legends[0].get_texts()]
     assert "rls (off scale)" in labels
     assert "rls-filter" in labels
+
+
+def test_ticks_of_a_logarithmic_axis_are_numbers():
+    for draw in (figures.error_bars, figures.error_over_time):
+        figure = draw(made_up(off=1e3))
+        with look():  # as it is saved
+            figure.canvas.draw()
+        ticks = [ax.get_yticklabels(which="both") for ax in figure.axes if ax.get_yscale() == "log"]
+        assert ticks
+        for labels in ticks:
+            written = [label.get_text() for label in labels if label.get_text()]
+            assert len([float(text) for text in written]) > 1
 
 
 def test_a_method_keeps_its_colour_in_every_figure_and_baselines_are_grey():
