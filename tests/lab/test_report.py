@@ -137,6 +137,18 @@ def test_images_carry_their_caption_as_text(page):
     assert all(len(image["alt"]) > 20 for image in Page(page[1]).images)
 
 
+def test_rows_are_headed_and_what_scrolls_is_reached_by_keyboard():
+    """A screen reader says the head of a row with each cell; whoever has no mouse scrolls what has the focus."""
+    page = render(default_report(made_up()))
+    body = page.split("<tbody>", 1)[1]
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", body.split("</tbody>")[0])
+    assert rows
+    assert all(re.match(r'<th scope="row"[^>]*>[^<]+</th><td', row) for row in rows)
+    regions = re.findall(r'<div class="wide"([^>]*)>', page)
+    assert regions
+    assert all(re.search(r'role="region" tabindex="0" aria-label="[^"]+"', region) for region in regions)
+
+
 def test_the_same_comparison_gives_the_same_bytes():
     first, second = (
         render(
