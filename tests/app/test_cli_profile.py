@@ -21,6 +21,8 @@ from armload.app.cli.profile_text import next_steps, of_motors, print_profile
 from armload.arms import arm
 from armload.errors import UsageError
 from armload.inertia import InertialParameters
+from armload.lab.report.profile_figure import profile_figure
+from armload.lab.report.style import look
 from armload.motion import random_motion, save_motion, taie2024
 from armload.online import OnlineIdentifier
 from armload.payloads import hand_on
@@ -129,6 +131,19 @@ def test_a_figure_is_of_the_profile_s_own_arm_in_the_form_that_its_name_says(pro
     assert main([*show, str(tmp_path / "arm.svg"), "--robot", "panda"]) == 0
     assert f"wrote {tmp_path / 'arm.svg'}" in capsys.readouterr().err
     assert b"<svg" in (tmp_path / "arm.svg").read_bytes()
+
+
+def test_nothing_of_the_figure_is_cut_off_and_sessions_are_whole(profile):
+    figure = profile_figure(load_profile(profile), arm("panda"))
+    with look():
+        figure.canvas.draw()
+    written = figure.get_tightbbox()  # [in]
+    assert min(written.x0, written.y0) >= 0.0
+    assert written.x1 <= figure.get_figwidth()
+    assert written.y1 <= figure.get_figheight()
+    sessions = next(ax for part in figure.subfigs for ax in part.axes if ax.get_xlabel() == "session")
+    ticks = sessions.get_xticks()
+    assert np.array_equal(ticks, np.round(ticks))
 
 
 def test_logs_are_added_about_the_profile_s_own_frame(folder, profile, capsys, tmp_path):

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import urllib.request
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from time import sleep
 from urllib.parse import urlsplit
@@ -32,6 +33,7 @@ from armload.errors import ArmloadError, SinkError, SourceError, UsageError
 from armload.identification import check_plausible
 from armload.inertia import UNITS, InertialParameters
 from armload.online import OnlineIdentifier
+from armload.online.gate import Health
 from armload.payloads import random_payload, solids, test_payload
 from armload.recording import Recording, Sample, read_recording, write_recording
 from armload.service import History, Session
@@ -786,6 +788,23 @@ def test_numbers_have_units_and_what_is_not_determined_says_so(held):
     assert parameters(at_first).count("unknown") == 10
     assert "kg</div>" not in headline(at_first)
     assert "nothing has happened" in events([])
+
+
+def test_the_page_names_what_rests_on_the_prior_as_a_line_does(held):
+    leaning = np.isin(np.arange(10), [5, 6, 8])
+    # what is undetermined is said already
+    estimate = replace(held.estimate, determined=np.arange(10) != 8, rests_on_prior=leaning)
+    said = parameters(estimate).split('data-armload="prior">')[1].split("</div>")[0]
+    assert said == "more on the prior than on the samples: Ixy, Ixz"
+    assert "more on the prior" not in parameters(replace(estimate, rests_on_prior=np.zeros(10, dtype=bool)))
+
+
+def test_a_pause_or_a_clock_that_was_set_is_no_sample_left_out():
+    assert str(Health(6097, pauses=1)) == "6097 samples; 1 pause"
+    left_out = {"not a number": 3}
+    assert str(Health(10, left_out, pauses=2, clock_jumps=1)) == (
+        "10 samples, left out: 3 not a number; 2 pauses; 1 clock jump"
+    )
 
 
 def test_the_centre_of_mass_has_the_error_bars_of_its_region(held):

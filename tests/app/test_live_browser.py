@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armload.app.page.curves import GROUPS
 from armload.app.page.motion_page import MotionPage
 from armload.app.page.page import Page
 from armload.arms import arm as arm_named
@@ -173,6 +174,30 @@ def test_numbers_move_and_approach_the_truth(served, tab):
     assert "samples" in text(tab, "health")
     assert float(tab.locator("[data-armload=phi0] td").first.inner_text()) == pytest.approx(later[0], abs=0.05)
     assert session.error is None
+
+
+def test_a_screen_reader_is_told_what_changes_and_of_every_control_what_it_is(holding):
+    live = holding.get_by_role("status")
+    # a busy machine says before it that it is not of now
+    until(lambda: live.inner_text().endswith("a payload is held"))
+    for group in GROUPS:
+        assert holding.get_by_role("img", name=f"curves of {group.title} over time").count() == 1
+    assert holding.get_by_role("img", name="picture of the arm in three dimensions").count() == 1
+    nameless = "x => !x.closest('[role=alert]') && !x.innerText.trim() && !x.getAttribute('aria-label')"
+    assert holding.locator("button").evaluate_all(f"all => all.filter({nameless}).length") == 0
+
+
+def test_the_slider_of_a_motion_is_called_by_its_label(panda, open_browser):
+    page = MotionPage(taie2024(), panda, port=0)
+    server = threading.Thread(target=page.serve)
+    server.start()
+    try:
+        with open_browser(page.url, [], []) as tab:
+            until(lambda: tab.get_by_role("slider", name="Time [s]").count() == 1)
+            assert tab.get_by_role("textbox", name="Time [s]").count() == 1
+    finally:
+        page.close()
+        server.join()
 
 
 @pytest.mark.parametrize("tab", [LARGE], indirect=True, ids=["large"])
@@ -329,6 +354,7 @@ def test_a_page_that_hears_nothing_says_that_it_is_old_and_goes_on_by_itself(pan
         shade = "e => getComputedStyle(e.closest('[data-beat]')).opacity"
         until(lambda: float(tab.locator("[data-armload=mass]").evaluate(shade)) < 0.5)
         assert "what is shown is old" in unheard.inner_text()
+        until(lambda: tab.get_by_role("status").inner_text() == "nothing is heard of armload")
         assert tab.evaluate("document.hasFocus()")  # nobody has to click on a display on a wall
         stack.enter_context(page_of(logs[1], panda, port))
         until(lambda: (now := mass(tab)) is not None and now[0] < 0.5)

@@ -120,6 +120,22 @@ def test_the_headline_says_of_when_an_answer_is_that_is_not_of_now(seen):
     assert "font-weight:600" in now
 
 
+def test_what_is_told_of_the_state_has_no_number_that_changes_with_each_picture(seen):
+    def told(html):
+        return re.search(r'data-armload="state"[^>]* data-spoken="([^"]*)"', html)[1]
+
+    status = Watcher(seen).look()._replace(why=None)
+    still = replace(seen.estimate, moving=False)
+    assert told(tables.headline(still, None, status)) == "a payload is held"
+    for reason, words in (
+        (Unknown.SOURCE_ENDED, "at the end of the source: a payload is held"),
+        (Unknown.BEHIND, "not of now: a payload is held"),
+    ):
+        assert told(tables.headline(still, None, status._replace(why=Why(reason, "2.2 s"), age=2.2))) == words
+    assert told(tables.gone(status._replace(why=Why(Unknown.SILENT, "no sample for 1.2 s")))) == "no answer: silent"
+    assert told(tables.headline(None)) == "waiting for the first sample"
+
+
 def test_what_is_below_does_not_move_while_the_answer_becomes_known(seen):
     """As many lines of the centre of mass, columns of given width, and no sign of a zero that comes and goes."""
     unknown = replace(seen.estimate, determined=np.zeros(10, dtype=bool))

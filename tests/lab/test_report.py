@@ -20,7 +20,7 @@ from armload.lab.evaluation import Comparison, EvaluationRun, Table
 from armload.lab.report import ReportError, Section, answer_section, default_report, render, write_report
 from armload.lab.report import comparison_figures as figures
 from armload.lab.report import recording_figures as recordings
-from armload.lab.report.style import method_styles
+from armload.lab.report.style import look, method_styles
 from armload.motion import taie2024
 from armload.regression import first_order_lag
 from armload.simulation import simulate
@@ -135,6 +135,18 @@ def test_page_holds_every_method_and_every_number_of_the_comparison(page):
 
 def test_images_carry_their_caption_as_text(page):
     assert all(len(image["alt"]) > 20 for image in Page(page[1]).images)
+
+
+def test_rows_are_headed_and_what_scrolls_is_reached_by_keyboard():
+    """A screen reader says the head of a row with each cell; whoever has no mouse scrolls what has the focus."""
+    page = render(default_report(made_up()))
+    body = page.split("<tbody>", 1)[1]
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", body.split("</tbody>")[0])
+    assert rows
+    assert all(re.match(r'<th scope="row"[^>]*>[^<]+</th><td', row) for row in rows)
+    regions = re.findall(r'<div class="wide"([^>]*)>', page)
+    assert regions
+    assert all(re.search(r'role="region" tabindex="0" aria-label="[^"]+"', region) for region in regions)
 
 
 def test_the_same_comparison_gives_the_same_bytes():
@@ -252,6 +264,18 @@ def test_one_method_far_off_does_not_flatten_the_rest():
     labels = [t.get_text() for t in figures.parameter_over_time(c).legends[0].get_texts()]
     assert "rls (off scale)" in labels
     assert "rls-filter" in labels
+
+
+def test_ticks_of_a_logarithmic_axis_are_numbers():
+    for draw in (figures.error_bars, figures.error_over_time):
+        figure = draw(made_up(off=1e3))
+        with look():  # as it is saved
+            figure.canvas.draw()
+        ticks = [ax.get_yticklabels(which="both") for ax in figure.axes if ax.get_yscale() == "log"]
+        assert ticks
+        for labels in ticks:
+            written = [label.get_text() for label in labels if label.get_text()]
+            assert len([float(text) for text in written]) > 1
 
 
 def test_a_method_keeps_its_colour_in_every_figure_and_baselines_are_grey():

@@ -225,6 +225,9 @@ def test_logs_without_dates_are_counted_from_one_and_nothing_has_half_a_log_or_p
     for axis in (ax.xaxis, histogram.axes[0].yaxis):
         ticks = axis.get_ticklocs()
         assert np.array_equal(ticks, np.round(ticks))
+    (single,) = survey_sections(few[:1], arm_findings(few[:1]), 7)[1].figures[0][0].axes
+    assert [at for at in single.get_xticks() if np.diff(single.get_xlim())[0] > abs(at - 1.0)] == [1.0]
+    assert single.get_xlabel().startswith("payloads of an arm in order")
 
 
 def test_where_some_logs_have_no_date_all_are_in_order_on_one_axis(rows):

@@ -65,10 +65,11 @@ class Health:
         return sum(self.left_out.values())
 
     def __str__(self) -> str:
-        counts = [f"{count} {reason}" for reason, count in self.left_out.items() if count]
-        counts += [f"{self.pauses} pause{'s' * (self.pauses > 1)}"] if self.pauses else []
-        counts += [f"{self.clock_jumps} clock jump{'s' * (self.clock_jumps > 1)}"] if self.clock_jumps else []
-        return f"{self.used} samples" + (f", left out: {', '.join(counts)}" if counts else "")
+        left_out = ", ".join(f"{count} {reason}" for reason, count in self.left_out.items() if count)
+        parts = [f"{self.used} samples" + (f", left out: {left_out}" if left_out else "")]
+        parts += [f"{self.pauses} pause{'s' * (self.pauses > 1)}"] if self.pauses else []
+        parts += [f"{self.clock_jumps} clock jump{'s' * (self.clock_jumps > 1)}"] if self.clock_jumps else []
+        return "; ".join(parts)
 
 
 class Gate:

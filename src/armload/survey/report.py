@@ -11,13 +11,13 @@ import numpy as np
 
 from armload.lab.report import Section, write_report
 from armload.lab.report.shown import Table
-from armload.lab.report.style import COLOURS, look, new_figure
+from armload.lab.report.style import COLOURS, look, new_figure, whole
 from armload.survey.findings import LAST, SHARE_CHANGED, SHARE_MOVES, ArmFinding, arm_findings, by_log, doubtful
 from armload.survey.looseness import LOOSE
 from armload.survey.rows import ANSWERED, SEPARATOR, UNUSABLE, original_of, shows_the_arm
 from armload.survey.shift import SHIFTED
 from armload.survey.table_file import read_rows
-from armload.survey.time_axis import are_dated, mark, time_label, times_of, whole
+from armload.survey.time_axis import are_dated, mark, time_label, times_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,7 +125,7 @@ def _payloads(rows: Sequence[dict[str, Any]], findings: Sequence[ArmFinding]) ->
             }
             drawn.append(ax.errorbar(x, mass, half, fmt="osD^v"[k // len(COLOURS) % 5], alpha=0.75, **style))
             mark(ax, x, 9)
-        ax.set_xlabel(time_label(held, dated))
+        ax.set_xlabel(time_label(held, dated, "payloads of an arm"))
         ax.set_ylabel("mass [kg]")
         if len(findings) <= 30:
             # matplotlib leaves out what has a label that begins with an underscore, as an arm's name may

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from armload.lab.report.style import whole
 from armload.survey.rows import ANSWERED
 
 # of dates, whose axis tells years, months, days, hours, minutes or seconds
@@ -41,17 +42,14 @@ def mark(ax: Any, x: np.ndarray, most: int) -> None:
         whole(ax.xaxis, most)
 
 
-def whole(axis: Any, most: int = 9) -> None:
-    """Ticks at whole numbers: there is no half of a log, nor of a payload."""
-    from matplotlib.ticker import MaxNLocator
+def time_label(rows: Sequence[dict[str, Any]], dated: bool, what: str = "logs") -> str:
+    """What an axis of time says of itself: ticks have room for neither the year nor, within a day, the day.
 
-    axis.set_major_locator(MaxNLocator(most, integer=True))
-
-
-def time_label(rows: Sequence[dict[str, Any]], dated: bool) -> str:
-    """What an axis of time says of itself: ticks have room for neither the year nor, within a day, the day."""
+    Args:
+        rows: what is drawn. dated: by when it was recorded, or else in its order. what: is drawn.
+    """
     if not dated:
-        return "logs in order: not all of them say when they were recorded"
+        return f"{what} in order: not all logs say when they were recorded"
     days = [datetime.fromtimestamp(row["date"], UTC).strftime("%Y-%m-%d") for row in rows if row["status"] == ANSWERED]
     first, last = min(days), max(days)
     return f"date (UTC), {first}" if first == last else f"date (UTC), {first} to {last}"

@@ -15,6 +15,7 @@ import numpy as np
 
 from armload.app.page.scene import HELD, REGION, TRUTH, DrawnArm
 from armload.app.page.server import PageServer, look_at_arm
+from armload.app.page.spoken import spoken
 from armload.app.page.style import SHEET, TEXT, awake
 from armload.arms import PAYLOAD_REACH, Arm
 from armload.arms.units import heading, marked
@@ -119,7 +120,7 @@ class MotionPage:
 
     def _build_panel(self, gui: Any) -> None:
         motion = self._motion
-        gui.add_html(SHEET + awake(self._page.label))
+        gui.add_html(SHEET + awake(self._page.label) + spoken())
         gui.add_html(f'<div style="{TEXT}"><b>{escape(motion.name)}</b>, {motion.duration:g} s</div>')
         self._runs = gui.add_checkbox("Run", initial_value=True)
         self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="real time")

@@ -16,6 +16,7 @@ from armload.app.page.curves import AXES, GROUPS, HEIGHT, PADDING, Group, bands_
 from armload.app.page.download import ENDINGS, file_of
 from armload.app.page.scene import Scene
 from armload.app.page.server import PageServer, look_at_middle, look_from
+from armload.app.page.spoken import spoken
 from armload.app.page.status import Status, Watcher
 from armload.app.page.style import SHEET, SOFT, TEXT, awake, heard, unheard
 from armload.arms import Arm, rated_mass
@@ -134,7 +135,8 @@ class Page:
         panel.expand()  # on a phone panels are sections of one sheet, closed at first
 
     def _add_curves(self, gui: Any, group: Group) -> None:
-        gui.add_html(f'<div style="{TEXT};padding-bottom:0">{legend_of(group)}</div>')
+        named = f'data-armload="legend" data-title="{group.title}"'
+        gui.add_html(f'<div style="{TEXT};padding-bottom:0" {named}>{legend_of(group)}</div>')
         plot = gui.add_uplot(
             data_of(group, *self.session.history.last(1.0)),
             series_of(group),
@@ -174,7 +176,7 @@ class Page:
 
     def _build_panel(self, gui: Any) -> None:
         session = self.session
-        gui.add_html(SHEET + awake(self._page.label))
+        gui.add_html(SHEET + awake(self._page.label) + spoken())
         self._headline = gui.add_html(tables.headline(None))
         self._add_curves(gui, GROUPS[0])  # where a phone shows it without scrolling
         self._status = gui.add_html("")

@@ -66,7 +66,8 @@ def heard(html: str, beat: int) -> str:
 def unheard(beat: int) -> str:
     """What comes into view once nothing has been heard for `HEARD` seconds."""
     return (
-        f'<div data-beat="{beat}" data-armload="unheard" style="{TEXT};visibility:hidden;max-height:0;overflow:hidden;'
+        f'<div data-beat="{beat}" data-armload="unheard" data-spoken="nothing is heard of armload" '
+        f'style="{TEXT};visibility:hidden;max-height:0;overflow:hidden;'
         f'animation:armload-unheard 0s linear {HEARD:g}s forwards">{dot(BAD)}<span{WARNING}>nothing is heard of '
         "armload: what is shown is old. It goes on by itself when armload is there again; if its token is new for each "
         "run, open the address that it prints.</span></div>"

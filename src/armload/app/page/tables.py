@@ -20,6 +20,7 @@ from armload.service.unknown import Unknown
 _DECIMALS = (3, 4, 4, 4, 5, 5, 5, 5, 5, 5)
 _LARGE = "font-size:22px"
 _LINES = 4  # of the status: what is below it stays where it is while it says more or less
+_PRIOR_LINES = 2  # below the table, kept for the same reason
 # widths of the table's columns, so that none moves while a number becomes known: name, value, ± 95 %, truth, unit
 _WIDTHS = ("3.1em", "auto", "5.2em", "auto", "3.7em")
 _NARROW = 300  # [px] that the table needs; viser's narrowest panel leaves 302
@@ -36,7 +37,8 @@ def headline(
         status: how the answer is to be taken; None: as it is.
     """
     if estimate is None:
-        return f'<div style="{TEXT}" data-armload="state">{dot(WAIT)}waiting for the first sample</div>'
+        words = "waiting for the first sample"
+        return f'<div style="{TEXT}" data-armload="state" data-spoken="{words}">{dot(WAIT)}{words}</div>'
     why, misfit = (None, None) if status is None else (status.why, status.misfit)
     mass = "—"
     if estimate.determined[0]:
@@ -49,15 +51,19 @@ def headline(
     )
     colour = BAD if doubted else GOOD if sure else WAIT
     state = state_of(estimate, misfit)
+    told = state.partition(";")[0]  # without what comes and goes with each stop, and without numbers
+    if why is not None and why.reason in _OLD:
+        told = f"not of now: {told}"
     if why is not None and why.reason in _OLD and status is not None and status.age is not None:
         state = f"{in_words(status.age)} ago: {state}"
     elif why is not None and why.reason is Unknown.SOURCE_ENDED:
-        state = f"at the end of the source: {state}"
+        state, told = (f"at the end of the source: {words}" for words in (state, told))
     old = doubted or (why is not None and why.reason in _OLD)
     size = f"{_LARGE};{SOFT}" if old else f"{_LARGE};font-weight:600"
     lines = [
         f'<div style="{size}" data-armload="mass">{mass}</div>',
-        f'<div data-armload="state"><span style="font-size:15px">{dot(colour)}{escape(state)}</span>'
+        f'<div data-armload="state" data-spoken="{escape(told)}">'
+        f'<span style="font-size:15px">{dot(colour)}{escape(state)}</span>'
         f"{'' if doubted else _lines(remarks)}</div>",
         f'<div style="{SOFT if old else ""}" data-armload="com">{_com(estimate, doubted)}</div>',
         f'<div style="{SOFT}" data-armload="truth">{_truth(truth)}</div>' if truth is not None else "",
@@ -73,10 +79,10 @@ def _doubted(estimate: OnlineEstimate, misfit: str | None) -> bool:
 
 def gone(status: Status) -> str:
     """In the place of the headline while the last answer says nothing of the present."""
-    why = "" if status.why is None else status.why.text
+    why, told = ("", "") if status.why is None else (status.why.text, f"no answer: {status.why.reason}")
     return (
         f'<div style="{TEXT}"><div style="{_LARGE};font-weight:600" data-armload="mass">—</div>'
-        f'<div data-armload="state"{WARNING}>{dot(BAD)}{escape(why)}</div></div>'
+        f'<div data-armload="state" data-spoken="{told}"{WARNING}>{dot(BAD)}{escape(why)}</div></div>'
     )
 
 
@@ -148,7 +154,10 @@ def rests_on(estimate: OnlineEstimate) -> str:
 
 
 def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None = None) -> str:
-    """The ten parameters with intervals and units; what the stream does not determine is marked."""
+    """The ten parameters with intervals and units; what the stream does not determine is marked.
+
+    Below them are those whose interval comes more from the prior than from the samples.
+    """
     if estimate is None:
         return ""
     heads = [("", "left"), ("value", "right"), ("± 95 %", "right"), ("truth", "right"), ("unit", "left")]
@@ -171,8 +180,16 @@ def parameters(estimate: OnlineEstimate | None, truth: InertialParameters | None
         rows.append(f'<tr data-armload="phi{k}" style="{"" if known else SOFT}">{head_of_row}{row}</tr>')
     return (
         f'<div style="{TEXT};overflow-x:auto"><table style="width:100%;min-width:{_NARROW}px;table-layout:fixed;'
-        f'border-collapse:collapse;white-space:nowrap"><tr>{head}</tr>{"".join(rows)}</table></div>'
+        f'border-collapse:collapse;white-space:nowrap"><tr>{head}</tr>{"".join(rows)}</table>'
+        f'<div style="{SOFT};padding:0 4px;min-height:{1.45 * _PRIOR_LINES:g}em" data-armload="prior">'
+        f"{_on_the_prior(estimate)}</div></div>"
     )
+
+
+def _on_the_prior(estimate: OnlineEstimate) -> str:
+    leaning = estimate.determined & estimate.rests_on_prior
+    names = ", ".join(name for name, leans in zip(NAMES, leaning, strict=True) if leans)
+    return f"more on the prior than on the samples: {names}" if names else ""
 
 
 def _signed(value: float, digits: int) -> str:

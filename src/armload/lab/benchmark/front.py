@@ -16,7 +16,7 @@ from armload.lab.benchmark.targets import MISSED, NOT_CLEAR, REACHED
 from armload.lab.evaluation import Table
 from armload.lab.report import Section
 from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import look, new_figure, styles_of
+from armload.lab.report.style import logarithmic, look, new_figure, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,7 +93,7 @@ def picture(summary: Summary) -> Figure:
                 if method == of:
                     marked = np.array([(float(t), group) in lost for t in times])
                     ax.plot(times[marked], mean[marked], "o", ms=11, mfc="none", mec="#D55E00", zorder=5)
-            ax.set_yscale("log")
+            logarithmic(ax)
             ax.set_title(group)
             ax.set_ylabel(f"mean absolute error [{SHOWN_UNITS[part][0]}]")
         last = axes.flat[-1]

@@ -10,7 +10,7 @@ from armload.lab.benchmark.benchmark_tables import Results, row_names
 from armload.lab.benchmark.measured import Measured
 from armload.lab.report.panels import legend, three_in_a_row
 from armload.lab.report.shown import SHOWN_SCALE
-from armload.lab.report.style import look, styles_of
+from armload.lab.report.style import logarithmic, look, styles_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +47,7 @@ def error_over_time(m: Measured, styles: dict[str, dict]) -> Figure:
                 bar = np.minimum(np.nan_to_num(error[i, :, k]), 0.9 * mean)
                 ax.errorbar(m.times, mean, yerr=bar, label=row, elinewidth=0.8, **styles[row])
             _over_time(ax, m, group, f"mean absolute error [{unit}]")
-            ax.set_yscale("log")
+            logarithmic(ax)
         legend(figure, figure.axes[0])
     return figure
 

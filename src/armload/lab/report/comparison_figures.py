@@ -9,7 +9,7 @@ import numpy as np
 from armload.inertia import NAMES, Z95
 from armload.lab.report.panels import bars_of_errors, legend, parameters, three_panels
 from armload.lab.report.shown import SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import TRUTH, look, method_styles, new_figure
+from armload.lab.report.style import TRUTH, logarithmic, look, method_styles, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +77,7 @@ def error_over_time(comparison: Comparison, parameter: int = 0) -> Figure:
                 low, high = np.maximum(mae[m] - spread[m], floor), mae[m] + spread[m]
                 ax.fill_between(comparison.times, low, high, color=styles[name]["color"], alpha=0.12, linewidth=0)
         if np.isfinite(floor):
-            ax.set_yscale("log")
+            logarithmic(ax)
         _time_axis(ax, comparison)
         ax.set_ylabel(f"mean absolute error of {NAMES[parameter]} [{unit}]")
         legend(figure, ax)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armload.inertia import NAMES
 from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import look, new_figure
+from armload.lab.report.style import logarithmic, look, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,7 +68,7 @@ def bars_of_errors(
                     **styles[label],
                 )
             if log:
-                ax.set_yscale("log")
+                logarithmic(ax)
                 ax.set_ylim(bottom=floor)
             parameters(ax, part)
             ax.set_title(name + (", logarithmic" if log else ""))

@@ -9,7 +9,7 @@ import numpy as np
 
 from armload.arms import Arm
 from armload.errors import ReportError
-from armload.lab.report.style import COLOURS, look, new_figure
+from armload.lab.report.style import COLOURS, look, new_figure, whole
 from armload.runtime.atomic import replacing
 
 if TYPE_CHECKING:
@@ -59,8 +59,9 @@ def profile_figure(profile: Profile, arm: Arm) -> Figure:
             offsets = [session.offset[j] for session in profile.sessions]
             ax.plot(k, offsets, dash, marker="o", markersize=3, color=COLOURS[j % len(COLOURS)], label=f"joint {j + 1}")
         ax.set_xlabel("session")
+        whole(ax.xaxis)
         ax.set_ylabel("offset [N·m]")
-        ax.legend(ncols=min(8, profile.n), loc="upper center", bbox_to_anchor=(0.5, 1.22))
+        below.legend(*ax.get_legend_handles_labels(), ncols=min(8, profile.n), loc="outside upper center")
     return figure
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from armload.inertia import NAMES
 from armload.lab.report.panels import parameters
 from armload.lab.report.shown import GROUPS, SHOWN_SCALE, SHOWN_UNITS
-from armload.lab.report.style import COLOURS, TRUTH, look, new_figure
+from armload.lab.report.style import COLOURS, TRUTH, logarithmic, look, new_figure
 from armload.lab.study.counterparts import benchmark_rows, curves, real_rows, training_rows
 from armload.lab.study.numbers import EXACT, Cells, on_many_arms
 from armload.lab.study.study_tables import LEARNERS, LEAST_SQUARES, Row
@@ -97,7 +97,7 @@ def _bars(ax: Axes, rows: Sequence[Row], part: slice) -> None:
         ax.bar(at[seen], means[seen], 0.92 * width, color=colour, label=label, hatch=hatch, edgecolor="white", lw=0.3)
     shown = SHOWN_SCALE * np.concatenate([e[:, part].mean(axis=0) for _, e in rows if e is not None])
     if shown.max() > _LOG_FROM * shown[shown > SHOWN_SCALE * EXACT].min(initial=np.inf):
-        ax.set_yscale("log")
+        logarithmic(ax)
     parameters(ax, part)
 
 
@@ -135,7 +135,7 @@ def _ratios(ax: Axes, title: str, claims: Sequence[Mapping[str, Any]], of: str) 
                 [x], [paper], "D", mfc="white", mec=colour, ms=6, zorder=4, label=f"paper{label}" if first else None
             )
     ax.axhline(1.0, color="#555555", lw=0.9)
-    ax.set_yscale("log")
+    logarithmic(ax)
     ax.set_xlim(-0.5, len(NAMES) - 0.5)
     parameters(ax, slice(0, len(NAMES)))
     ax.set_title(title)
