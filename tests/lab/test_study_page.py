@@ -22,7 +22,7 @@ from armload.lab.study.numbers import both_stages
 from armload.lab.study.paper_figures import figures
 from armload.lab.study.plain import against_table, in_plain_words
 from armload.lab.study.rivals import rivals
-from armload.lab.study.study_front import claims_table, front
+from armload.lab.study.study_front import claims_table, front, statements_table
 from armload.lab.study.study_page import html_report, sections, summary_json, write_pages
 from armload.lab.study.study_tables import COMMAND, PROTOCOLS, epochs_table, main_tables, value
 from armload.lab.study.summary import paragraphs
@@ -438,6 +438,75 @@ def test_errors_averaged_over_time_are_shown_for_held_out_payloads():
     shown = row(averaged_table(cells), "trees, single-stage")
     assert shown["single: mass [g]"].startswith("100")
     assert shown["averaged: mass [g]"].startswith("50")
+
+
+# ------------------------------------------------------------------ arms, trainings, chance
+
+
+def on_arms(cells, arms):
+    """The same study, its readings measured on so many real-like arms."""
+    for c in cells.values():
+        if c["name"].startswith("reading"):
+            part = c["protocols"]["test_payload_real_like"]
+            for kept in ("running", "first", "labels"):
+                part[kept] = (part[kept] * arms)[:arms]
+    return cells
+
+
+def test_runs_of_every_method_are_told_from_those_of_the_readings_and_the_rivals(tmp_path):
+    text = page_of(on_arms(study(), 7), tmp_path)
+    assert "test payload, nominal arm 3, test payload, real-like arms 4 (7 for the readings and the rivals), " in text
+
+
+def test_numbers_of_arms_are_those_of_the_cells(tmp_path):
+    text = page_of(study(), tmp_path)  # four real-like arms, three runs on the nominal one
+    assert "same-prior least squares (on 4 of the arms)" in text
+    assert "All on the same 4 real-like arms." in text
+    assert "3 runs on the nominal arm, 4 on real-like arms." in text
+    assert not re.search(r"five of the arms|30 real-like|thirty", text)
+
+
+def test_a_statement_shows_what_other_trainings_give_beside_its_interval():
+    cells = study()
+    for c in cells.values():
+        if c["spec"]["kind"] == "tree" and c["spec"]["seed"] == 1 and c["spec"]["ablation"] is None:
+            part = c["protocols"]["test_payload_real_like"]
+            part["running"] = (2.0 * np.array(part["running"])).tolist()
+    table = statements_table(evaluate(cells), cells)
+    close = row(table, "real-close-tree")
+    assert close["ours"].startswith("2.7 ")  # 0.8 over 0.3, of the seed 0
+    assert close["three trainings"] == "2.7 to 5.3"
+    assert {row(table, name)["three trainings"] for name in ("real-close-network", "rls-settles")} == {"–"}
+    assert "the interval is for one training" in table.note
+
+
+def test_where_the_training_mean_is_right_by_chance_the_ratios_elsewhere_are_said():
+    cells = study()
+    for c in cells.values():
+        if "training-mean" in c["name"]:
+            for errors in c["protocols"]["test_payload_real_like"].values():
+                for one in errors if isinstance(errors[0], list) else []:
+                    one[3] = 2e-9  # m·rz, by the least that is no rounding
+    # elsewhere 1.6 and 0.8 over the training mean's 4
+    plain = in_plain_words(cells)
+    assert "On m·rz the training mean is right by chance; over the others it is 0.4 times (the trees) and 0.2" in plain
+    assert "without, 0.2 for trees and 0.1 for networks" in against_table(cells).note
+    assert "over the other parameters: trees 0.4; networks 0.2." in "\n".join(paragraphs(cells))
+    claims = {c["id"]: c["verdict"] for c in evaluate(cells)}
+    assert claims["first-step-tree"] == "not confirmed"  # by m·rz alone
+    conclusion = front(cells, evaluate(cells))[0].text
+    assert "hangs, for trees, on m·rz, where the training mean is right by chance" in conclusion
+    assert "errs 60 % less than that mean, on Izz, which Fig. 8 shows, 60 % less." in conclusion
+    assert "by chance" not in front(study(), evaluate(study()))[0].text
+
+
+def test_what_the_paper_does_not_give_is_not_called_the_paper_s(tmp_path):
+    text = page_of(study(), tmp_path)
+    gives, ours = (re.search(rf"\*\*What {which}\.\*\* (.*?)\n\n", text, re.S)[1]
+                   for which in ("the paper gives", "is ours by choice"))  # fmt: skip
+    assert not re.search("eight|six|second", gives)
+    assert ours.startswith("Eight sinusoids a joint over six seconds (the paper gives neither number")
+    assert "on signals without noise" in " ".join(ours.split())
 
 
 # ------------------------------------------------------------------ report and summary

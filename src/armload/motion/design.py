@@ -10,7 +10,8 @@ compared. Sigma weighs the joints by the torque that a calibrated Panda model le
 than a share of a limit, touch something or move the payload too fast are never accepted.
 
 Sources: Swevers, Ganseman, Tükel, De Schutter, Van Brussel, T-RO 1997 (Fourier excitation, D-criterion); Taie et al.,
-RA-L 2024, equations (5)–(6), for the form, the 8 harmonics and the base frequency. The coefficients are ours.
+RA-L 2024, equations (5)–(6), for the form; its reference [7] (Kurdas et al., ICRA 2022), as far as it is public, for
+the 8 harmonics and the 6 s. The coefficients are ours.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from armload.motion.fourier import FourierMotion
 from armload.motion.motion_file import save_motion
 
 SEED, STEPS = 2024, 60_000
-HARMONICS, PERIOD = 8, 6.0  # the paper's: eight sinusoids; T = 6 s
+HARMONICS, PERIOD = 8, 6.0  # [1], [s] those of the paper's reference [7]; the paper gives neither
 READY = (0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8)  # [rad] flange in front of the arm, facing down
 LENGTH = 0.1  # L [m], the size of the payloads of interest
 SIGMA = (0.20, 0.29, 0.19, 0.20, 0.08, 0.05, 0.05)  # [N·m] unexplained torque, joints 1–7, of a calibrated Panda

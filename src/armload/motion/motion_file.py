@@ -27,10 +27,11 @@ _SPLINE, _PATH = "b-spline", "path"
 
 
 def taie2024() -> FourierMotion:
-    """The excitation with the form of Taie et al. 2024: 8 harmonics, T = 6 s, for the Panda. Our own re-design.
+    """The excitation with the form of Taie et al. 2024 for the Panda: 8 harmonics, T = 6 s. Our own re-design.
 
-    The paper adopts the trajectory of its reference [7] (Kurdas et al., ICRA 2022), whose coefficients are published
-    nowhere; these are ours, found by `python -m armload.motion.design`.
+    The paper adopts the trajectory of its reference [7] (Kurdas et al., ICRA 2022) and gives neither of the two
+    numbers, which are those of [7] as far as it is public. Its coefficients are published nowhere; these are ours,
+    found by `python -m armload.motion.design`.
 
     >>> motion = taie2024()
     >>> motion.n, motion.harmonics, motion.duration

@@ -76,7 +76,7 @@ def averaged_table(cells: Cells) -> Table:
 
 def settings_table(cells: Cells) -> Table:
     """Every rival with its setting and its errors on the nominal arm and on real-like arms."""
-    rows = []
+    rows, runs = [], [0, 0]
     for cell in cells.values():
         spec = cell["spec"]
         if spec["kind"] == "rival":
@@ -88,16 +88,16 @@ def settings_table(cells: Cells) -> Table:
                 f"{setting['value']:g}" if setting["value"] else MISSING,
                 f"{setting['forgetting']:g}",
             )
-            errors = (np.array(part["second_half"], dtype=float) for part in cell["protocols"].values())
+            errors = [np.array(part["second_half"], dtype=float) for part in cell["protocols"].values()]
+            runs = [len(e) for e in errors]
             shown = [short(SHOWN_SCALE * float(e[:, part].mean())) for e in errors for part in GROUPS.values()]
             rows.append((*labels, *shown))
     heads = [f"{g} [{SHOWN_UNITS[p][0]}]" for g, p in GROUPS.items()]
     columns = ("method", "rate [Hz]", "noise", "setting", "forgetting")
     columns += tuple(f"{where}: {h}" for where in ("nominal", "real-like") for h in heads)
     note = (
-        "Setting: gain of the observer [1/s], half the window [s] or cut-off [Hz]. Three runs on the nominal arm, "
-        "thirty "
-        f"on real-like arms. {NOT_YET}"
+        f"Setting: gain of the observer [1/s], half the window [s] or cut-off [Hz]. {runs[0]} runs on the nominal arm, "
+        f"{runs[1]} on real-like arms. {NOT_YET}"
     )
     note = note if rows else f"Not measured yet: `{COMMAND}` does."
     return Table("Every rival", columns, tuple(sorted(rows)), note)

@@ -36,9 +36,10 @@ loading of our container, so that a learner only has to learn a constant. A stat
 the same way by a criterion of ours, under both splits.
 
 All intervals are of one kind: {100 * LEVEL:.0f} % of a bootstrap, over held-out payloads (Fig. 4 and 5) or over
-real-like arms (Fig. 6 to 8), for one training (seed 0), widened by what the seeds 1 and 2 change where three were
-trained (networks of at most 60 epochs and trees, in SI units). They say what other payloads or arms would give, not
-what another container, motion or simulator would."""
+real-like arms (Fig. 6 to 8), for one training (seed 0). Those of the percentages are widened by what the seeds 1 and 2
+change where three were trained (networks of at most 60 epochs and trees, in SI units); those of the statements are
+not, and what three trainings give stands beside them. They say what other payloads or arms would give, not what another
+container, motion or simulator would."""
 
 
 @cache

@@ -29,6 +29,7 @@ from armload.lab.study.study_tables import (
     listing,
     mass_shown,
 )
+from armload.lab.study.training_mean import names_by_chance, ratio_elsewhere
 
 _KINDS = ("tree", "network")
 _RIVALS = ("rls", "rls-filter", "rls-filter-calibrated", "same-prior")
@@ -57,16 +58,21 @@ def against_table(cells: Cells) -> Table:
     """The ensembles' error divided by that of least squares: one number for all ten parameters."""
     others = {m: at_end(benchmark(cells, m), REAL) for m in _RIVALS}
     others[TRAINING_MEAN] = at_end(benchmark(cells, "training-mean", "row"), REAL)
-    rows = []
+    rows, rest, blind = [], [], others[TRAINING_MEAN]
     for kind in _KINDS:
         own = both_stages(cells, kind, "row", REAL)
+        if own is not None and blind is not None:
+            rest.append(f"{short(ratio_elsewhere(own.errors, blind), 2)} for {LEARNERS[kind]}")
         ratios = (MISSING if own is None or e is None else _ratio(own.errors, e) for e in others.values())
         rows.append((LEARNERS[kind], *ratios))
+    hit = [] if blind is None or not rest else names_by_chance(blind)
+    chance = f"On {listing(hit)} the training mean is right by chance: without, {listing(rest)}. " if hit else ""
     return Table(
         "Error of an ensemble divided by the error of",
         ("ensemble", *(LEAST_SQUARES.get(m, m) for m in others)),
         tuple(rows),
         "Test payload on real-like arms, rows split at random, end of the run; geometric mean over the ten parameters. "
+        + chance
         + NOT_YET,
     )
 
@@ -106,10 +112,14 @@ def _first(cells: Cells) -> str:
         f"{mass_shown(e)} for {'the ' * (name != LEAST_SQUARES['rls-filter'])}{name}" for name, e in masses.items()
     ]
     ratios = [f"{_ratio(e, blind)} times (the {name})" for name, e in errors.items()]
-    return (
+    text = (
         f"After one sample on real-like arms the mass error is {listing(shown)}. Over all ten parameters the error is "
         f"{listing(ratios)} that of the {TRAINING_MEAN}."
     )
+    if hit := names_by_chance(blind):
+        rest = [f"{short(ratio_elsewhere(e, blind), 2)} times (the {name})" for name, e in errors.items()]
+        text += f" On {listing(hit)} the {TRAINING_MEAN} is right by chance; over the others it is {listing(rest)}."
+    return text
 
 
 def _torque(cells: Cells) -> str:

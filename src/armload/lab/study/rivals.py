@@ -1,10 +1,10 @@
 """Least squares as strong as it gets: RLS and filtered RLS over rate, derivative, noise and calibration, tuned.
 
-Recursive least squares on τ − τ_bare(q, dq, ddq) = Y·phi need an acceleration, and reference [7] does not say how it
-was differentiated, at which rate, nor with which forgetting factor. Each setting here is measured with its usual values
-and once more tuned: `tune` takes, from `GRID`, the setting with the smallest geometric mean over the ten parameters of
-the mean error on `TUNED_ON` other real-like arms, each with a loading of the training and on the study's motion. So it
-knows what the ensembles know, and nothing of the runs on which it is measured.
+Recursive least squares on τ − τ_bare(q, dq, ddq) = Y·phi need an acceleration, and what is public of reference [7] does
+not say how it was differentiated, at which rate, nor with which forgetting factor. Each setting here is measured with
+its usual values and once more tuned: `tune` takes, from `GRID`, the setting with the smallest geometric mean over the
+ten parameters of the mean error on `TUNED_ON` other real-like arms, each with a loading of the training and on the
+study's motion. So it knows what the ensembles know, and nothing of the runs on which it is measured.
 """
 
 from __future__ import annotations

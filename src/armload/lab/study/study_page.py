@@ -29,24 +29,27 @@ from armload.lab.study.study_tables import COMMAND, PROTOCOLS, epochs_table, mai
 
 TITLE = "The study of Taie et al. 2024, measured again"
 APPENDIX = "The study of Taie et al. 2024: all tables"
-_PAPER_GIVES = """**What the paper gives.** The arm, the kind of motion (eight sinusoids a joint, six seconds), 77
-loadings of a slotted container and their masses, 249 788 rows of 32 columns, inputs t, q, dq, tau, five members, one
-hidden layer of 500 ReLU units for at most 1000 epochs, unrestricted trees, 70 / 15 / 15 % of the rows, both parts
-drawn with replacement for each member, one stage or two.
+_PAPER_GIVES = """**What the paper gives.** The arm, the kind of motion (sums of sinusoids in every joint), 77 loadings
+of a slotted container and their masses, 249 788 rows of 32 columns, inputs t, q, dq, tau, five members, one hidden
+layer of 500 ReLU units for at most 1000 epochs, unrestricted trees, 70 / 15 / 15 % of the rows, both parts drawn with
+replacement for each member, one stage or two.
 
-**What is ours by choice.** The coefficients of the motion (the paper's are not public: a re-design of its form), the
-lengths of the container and of its weights, two positions a slot (the paper says both two and three), which 77
-loadings, the test payload, 3244 evenly spaced rows a run, MuJoCo in place of Gazebo, Adam with batches of 200 and a
-rate of 0.001, training in SI units (and once more standardised: the paper does not say), and stopping once ten epochs
-lower the validation loss by less than a ten-thousandth.
+**What is ours by choice.** Eight sinusoids a joint over six seconds (the paper gives neither number; they are those of
+its reference [7], as far as that is public), their coefficients (not public: a re-design of the form), the lengths of
+the container and of its weights, two positions a slot (the paper says both two and three), which 77 loadings, the test
+payload, 3244 evenly spaced rows a run, MuJoCo in place of Gazebo, Adam with batches of 200 and a rate of 0.001,
+training in SI units (and once more standardised: the paper does not say), on signals without noise (and once more with
+it: the paper does not say what its simulator adds), and stopping once ten epochs lower the validation loss by less than
+a ten-thousandth.
 
 **The benchmark** is the paper's reference [7], Kurdas et al., ICRA 2022: RLS on differentiated velocities; the same
 with its special filter (`filtered RLS`); and with its virtual calibration: the empty arm is identified on the run's own
 motion as if it carried a load, and the answer is subtracted (`filtered RLS calibrated as in [7]`). Our simulated
 friction and residual do not depend on the load, so the empty run repeats the arm's mismatch to the last detail: the
-best case for this calibration. Calibration on another motion is not theirs: it shows what is left where the empty arm
-was not moved along the same path. The real log holds no such run: there both rows are calibrated on another part of the
-log and are the same. Filter gain, forgetting and start of the recursion are ours: [7] does not state them.
+best case for this calibration. [7] is said to calibrate across different motions, too: the row `calibrated on another
+motion` shows what that comes to on our arms. The real log holds no such run: there both rows are calibrated on another
+part of the log and are the same. Filter gain, forgetting and start of the recursion are ours: what is public of [7],
+which is all that we know of it, does not state them.
 
 **No real Panda with a payload was measured.** Its stand-in are arms that differ from their model as real ones do, in
 links, friction, offsets and a smooth residual. Where a log of a real unloaded Panda was available, it is that log with
@@ -226,16 +229,21 @@ def _what_was_run(cells: Cells) -> str:
         + " epochs and labelled so: their numbers are not those of the paper's setting."
     )
     versions = ", ".join(f"{name} {version}" for name, version in data["versions"].items())
-    runs = {
-        p: max((len(c["protocols"].get(p, {}).get("labels", ())) for c in cells.values()), default=0) for p in PROTOCOLS
-    }
-    counts = ", ".join(f"{PROTOCOLS[p]} {count}" for p, count in runs.items() if count)
+    counts = ", ".join(f"{PROTOCOLS[p]} {_runs(cells, p)}" for p in PROTOCOLS if _runs(cells, p))
     return (
         f"`{COMMAND}` on {_grouped(data['rows'])} rows of {data['payloads']} payloads; {len(cells)} finished cells "
         f"(one method, training and split each), seeds {', '.join(map(str, data['seeds']))}. The cells took "
-        f"{data['wall_s'] / 3600:.2f} h, added up; measured side by side (`--jobs`) they pass in less. Runs on which "
-        f"every method is measured: {counts}. Versions: {versions}.{capped}"
+        f"{data['wall_s'] / 3600:.2f} h, added up; measured side by side (`--jobs`) they pass in less. Runs on "
+        f"which methods are measured: {counts}. Versions: {versions}.{capped}"
     )
+
+
+def _runs(cells: Cells, protocol: str) -> str:
+    """How many runs of a protocol every method has, and how many those that were measured on more arms."""
+    parts = [cell["protocols"][protocol] for cell in cells.values() if protocol in cell["protocols"]]
+    counts = sorted({len(part.get("second_half", part.get("running", ()))) for part in parts} - {0})
+    more = f" ({counts[-1]} for the readings and the rivals)" if counts[1:] else ""
+    return f"{counts[0]}{more}" if counts else ""
 
 
 def _grouped(number: int) -> str:

@@ -38,10 +38,9 @@ from armload.lab.study.study_tables import (
     listing,
     mass_shown,
 )
-from armload.payloads import test_payload
+from armload.lab.study.training_mean import HIT, names_by_chance, ratio_elsewhere
 
 _NOT_YET = f"not measured yet; `{COMMAND}` measures it."
-_HIT = 0.02  # of the truth, within which the training mean is right by chance
 _KINDS = ("tree", "network")
 
 
@@ -127,12 +126,12 @@ def _first_step(cells: Cells) -> str:
         + _capital("; ".join(f"{name}: {_over(errors, blind)}" for name, errors in first.items()))
         + "."
     )
-    truth = test_payload().parameters.phi
-    hit = [n for n, e, x in zip(NAMES, blind.mean(axis=0), truth, strict=True) if e < _HIT * abs(x)]
-    if hit:
+    if hit := names_by_chance(blind):
+        rest = [f"{name} {short(ratio_elsewhere(errors, blind), 2)}" for name, errors in first.items()]
         text += (
-            f" The training mean happens to be within {100 * _HIT:g} % of the truth on {listing(hit)}, which in the "
-            "geometric mean counts against every method that uses measurements, and hardly within a group."
+            f" The training mean happens to be within {100 * HIT:g} % of the truth on {listing(hit)}, which in the "
+            "geometric mean counts against every method that uses measurements, and hardly within a group. Geometric "
+            f"mean over the other parameters: {'; '.join(rest)}."
         )
     prior = benchmark(cells, "same-prior")
     begin, end = at_first(prior, REAL), at_end(prior, REAL)
