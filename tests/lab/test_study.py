@@ -290,6 +290,28 @@ def test_a_real_log_that_is_too_short_is_named_with_what_is_expected(tmp_path, a
         Basis(tmp_path, SMALL, path)._on_real_log()
 
 
+def test_a_real_log_that_cannot_be_read_ends_the_command_before_anything_is_measured(tmp_path, capsys):
+    path = tmp_path / "odd.csv"
+    path.write_text("clock,angle\n0,1\n")
+    command = ["reproduce", "taie2024", "--quick", "--out", str(tmp_path / "out"), "--real-log", str(path)]
+    assert main(command) == 2
+    out, err = capsys.readouterr()
+    (said,) = err.splitlines()
+    assert out == ""
+    assert said.endswith(f"expected a recording that `armload identify {path} --robot panda` reads without --columns")
+
+
+def test_the_torque_added_to_a_real_log_does_not_depend_on_its_rate(tmp_path, analytic_log, panda):
+    added = {}
+    for rate in (1000, 100):
+        log = analytic_log(panda, duration=20.5, rate=float(rate))
+        write_recording(tmp_path / f"{rate}.csv", log)
+        run = Basis(tmp_path, SMALL, tmp_path / f"{rate}.csv")._on_real_log()["test_payload_semi_real"][0]
+        added[rate] = run.recording.tau - log.between(10.0, 16.0).tau
+    exact = added[1000][:: 1000 // 100]
+    assert added[100] == pytest.approx(exact, abs=2e-3 * np.abs(exact).max())
+
+
 def test_the_command_stops_in_time_names_what_is_missing_and_writes_the_page(tmp_path, capsys):
     command = ["reproduce", "taie2024", "--quick", "--hours", "0", "--out", str(tmp_path)]
     assert main(command) == 0

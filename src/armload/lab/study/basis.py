@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from armload.arms import Arm, arm, payload_regressor
-from armload.errors import DatasetError
+from armload.errors import DatasetError, RecordingError
 from armload.inertia import InertialParameters
 from armload.lab.dataset import Dataset, build_dataset
 from armload.lab.evaluation import EvaluationRun
@@ -23,6 +23,7 @@ from armload.simulation import Run, Sensors, World, simulate_many
 # Seeds of what is drawn: kept apart, so that no run shares its noise with the training data.
 NOISE, WORLDS, FAMILY, MOTIONS, TARE, LOADINGS = 5000, 100, 7000, 300, 900, 20_000
 _WINDOWS, _WINDOW = (10.0, 12.0, 14.0), 6.0  # [s] of the real log: where its windows begin, and how long they last
+_SMOOTHED, _DEGREE = 0.05, 3  # [s] half the window of the real log's acceleration, and the degree of its polynomial
 PANDA, CONTAINER = "panda", "container"  # the paper's arm and payloads
 
 
@@ -171,19 +172,38 @@ class Basis:
         return out
 
     def _on_real_log(self) -> dict[str, list[EvaluationRun]]:
-        return {} if self.real_log is None else {SEMI_REAL: self._semi_real(self.real_log)}
+        return {} if self.real_recording is None else {SEMI_REAL: self._semi_real(self.real_recording)}
 
-    def _semi_real(self, path: Path) -> list[EvaluationRun]:
-        """Three 6 s windows of the real log with the payload's torque added; its first 10 s are the tare."""
-        from scipy.signal import savgol_filter
+    @cached_property
+    def real_recording(self) -> Recording | None:
+        """The real log, long enough for its windows; None: there is none.
 
-        log = read_recording(path, self.arm)
+        Raises:
+            DatasetError: it cannot be read by its own header, or is too short.
+        """
+        path = self.real_log
+        if path is None:
+            return None
+        try:
+            log = read_recording(path, self.arm)
+        except RecordingError as error:
+            raise DatasetError(
+                f"the real log {path} cannot be read: expected a recording that "
+                f"`armload identify {path} --robot {self.robot}` reads without --columns"
+            ) from error
         if log.duration < _WINDOWS[-1] + _WINDOW:
             raise DatasetError(
                 f"the real log {path} lasts {log.duration:.1f} s: expected at least {_WINDOWS[-1] + _WINDOW:g} s, of "
                 f"which the first {_WINDOWS[0]:g} s are the tare"
             )
-        ddq = np.asarray(savgol_filter(log.dq, 101, 3, deriv=1, delta=1.0 / log.rate, axis=0))
+        return log
+
+    def _semi_real(self, log: Recording) -> list[EvaluationRun]:
+        """Three 6 s windows of the real log with the payload's torque added; its first 10 s are the tare."""
+        from scipy.signal import savgol_filter
+
+        window = 2 * max(_DEGREE, round(_SMOOTHED * log.rate)) + 1
+        ddq = np.asarray(savgol_filter(log.dq, window, _DEGREE, deriv=1, delta=1.0 / log.rate, axis=0))
         added = payload_regressor(self.arm.frame_motion(log.q), log.dq, ddq) @ self.truth.phi
         loaded = Recording(log.t, log.q, log.dq, log.tau + added, source="semi-real")
         start = float(log.t[0])

@@ -49,7 +49,11 @@ def run_study(
         results: folder of the cells' files; those with the right key are not measured again.
         jobs, cluster, until, say: see `run_tasks`.
         progress: bars on stderr, for one job.
+
+    Raises:
+        DatasetError: the real log cannot be read or is too short, before anything is measured.
     """
+    _ = basis.real_recording
     todo = plan(basis.size)
     if jobs > 1 or cluster is not None:  # or each process would build them
         for sensors in sorted({spec.sensors for spec in todo}):
