@@ -24,4 +24,7 @@ LEFT_OUT: dict[str, str] = {
     "unsupervised classification of payload changes from torque [20]": (
         "detects a change of payload, but gives no parameters; `OnlineIdentifier` detects changes"
     ),
+    "support vector machine regression [21]": (
+        "one model of raw signals, for the mass alone; `tree` and `network` are bags of such, for all ten parameters"
+    ),
 }
