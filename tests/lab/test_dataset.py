@@ -226,6 +226,21 @@ def test_parts_that_a_kill_has_left_beside_a_finished_data_set_go(dataset, reque
     assert sorted(p.name for p in copy.iterdir()) == ["provenance.json", "table.parquet"]
 
 
+def test_a_damaged_data_set_is_built_again_in_the_way_its_message_says(copy, request_):
+    table, about = copy / "table.parquet", copy / "provenance.json"
+    whole = table.read_bytes(), about.read_bytes()
+    for path, left in ((table, whole[0][:100]), (table, None), (about, b"{")):
+        table.write_bytes(whole[0])
+        about.write_bytes(whole[1])
+        path.unlink() if left is None else path.write_bytes(left)
+        with pytest.raises(DatasetError, match="restore it, or remove the folder and build the data set again"):
+            build_dataset(copy, **request_)
+    for path in (table, about):
+        path.unlink(missing_ok=True)
+    copy.rmdir()
+    assert len(build_dataset(copy, **request_)) == 12 * ROWS
+
+
 def test_a_damaged_part_is_built_again(dataset, request_, tmp_path, monkeypatch):
     monkeypatch.setattr(build, "_finish", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):

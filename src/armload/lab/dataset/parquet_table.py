@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from armload.errors import DatasetError, one_line
 from armload.inertia import InertialParameters
-from armload.lab.dataset.provenance import TABLE_FILE, canonical, read_provenance
+from armload.lab.dataset.provenance import RESTORE, TABLE_FILE, canonical, read_provenance
 from armload.recording import Recording
 
 if TYPE_CHECKING:
@@ -118,11 +118,9 @@ def open_dataset(path: str | Path) -> Dataset:
         values = np.column_stack([table.column(name).to_numpy() for name in columns])
         identity = [table.column(name).to_numpy().astype(np.int32) for name in IDENTITIES]
     except FileNotFoundError:
-        raise DatasetError(f"{folder} lacks {TABLE_FILE}: restore it, or build the data set anew") from None
+        raise DatasetError(f"{folder} lacks {TABLE_FILE}: {RESTORE}") from None
     except (OSError, KeyError, ValueError, TypeError, pa.ArrowException) as error:
-        raise DatasetError(
-            f"{folder / TABLE_FILE} is damaged ({one_line(error)[:120]}): build the data set anew"
-        ) from None
+        raise DatasetError(f"{folder / TABLE_FILE} is damaged ({one_line(error)[:120]}): {RESTORE}") from None
     found = content_hash(provenance, [table])
     if found != provenance["sha256"]:
         raise DatasetError(

@@ -23,6 +23,7 @@ FORMAT = "armload data set 1"
 SAMPLERS = ("mujoco", "inverse")  # how runs come about: `simulate`, `simulate_inverse`
 PROVENANCE_FILE = "provenance.json"
 TABLE_FILE = "table.parquet"
+RESTORE = "restore it, or remove the folder and build the data set again"  # what is damaged is never written over
 _PACKAGES = ("armload", "mujoco", "numpy", "pin", "scipy")  # whose versions can change a simulated number
 
 
@@ -89,7 +90,7 @@ def read_provenance(folder: Path) -> dict[str, Any]:
     except (FileNotFoundError, NotADirectoryError):
         raise DatasetError(f"{folder} is not a data set: expected a folder with {PROVENANCE_FILE}") from None
     except (OSError, ValueError, RecursionError) as error:
-        raise DatasetError(f"{path} cannot be read ({error}): restore it, or build the data set anew") from None
+        raise DatasetError(f"{path} cannot be read ({error}): {RESTORE}") from None
     if not isinstance(provenance, dict) or provenance.get("format") != FORMAT:
         raise DatasetError(f"{path} is not the provenance of a data set of this version: expected format {FORMAT!r}")
     return provenance
