@@ -143,6 +143,19 @@ def test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples(youn
     assert all(set(one.marks) < set(marks) for one, marks in zip(kept, logs, strict=True))
 
 
+def test_long_streams_do_not_make_a_profile_forget_its_short_logs(young):
+    """Streams of whole shifts, over months: marks of 20 s are those by which a replay of them is known."""
+    rng = np.random.default_rng(2)
+    log = tuple(f"{x:012x}" for x in rng.integers(0, 1 << 47, 30))
+    kept: tuple = (replace(young.sessions[0], marks=log),)
+    for _ in range(40):
+        stream = tuple(f"{8 * x:012x}" for x in rng.integers(0, 1 << 44, 300))  # every eighth value, as a stream keeps
+        kept = remembered([*kept, replace(young.sessions[0], marks=stream)], most=2000)
+        assert sum(len(one.marks) for one in kept) <= 2000
+    assert kept[0].marks == log
+    assert all(len(one.marks) > 10 for one in kept)
+
+
 def test_a_session_that_is_added_is_held_against_the_drift_of_all_as_those_before_are(panda, life, young):
     """T ≤ deltaᵀ·D⁻¹·delta, and the k-th session's own delta² is part of (k + 3)·D, of which three count beforehand."""
     log = life[1][3]
