@@ -72,6 +72,8 @@ class Profile:
         sessions: what it was learned from. poses: (P, n) where the arm was seen [rad].
         gain_joint_std: (n,) standard deviation of each joint's gamma: a joint that hardly bears the weight keeps its
             prior. None: no weight, or a profile of an earlier version.
+        foretold: (7,) log density of the sessions that were added, as the profile before each foretold them, by each of
+            the factors that `repeated` may be (`foretold.REPEATED`). None: none was added, or by an earlier version.
     """
 
     arm_name: str
@@ -91,6 +93,7 @@ class Profile:
     gain: NDArray[np.float64] | None = None
     gain_std: float | None = None
     gain_joint_std: NDArray[np.float64] | None = None
+    foretold: NDArray[np.float64] | None = None
 
     @property
     def duration(self) -> float:
