@@ -16,18 +16,19 @@ from armload.errors import ArmloadError, IdentificationError, ModelError
 from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes
 from armload.lab.episodes.motion_kinds import MotionSource
+from armload.motion import random_motion
 from armload.online import OnlineIdentifier
 from armload.posterior import HybridIdentifier, learn_profile, load_profile, profile_learning, save_profile
 from armload.posterior.problem import Problem
 from armload.posterior.profile import remembered
 from armload.posterior.profile_learning import by_clock
-from armload.posterior.profile_session import log_data, without_drift
+from armload.posterior.profile_session import check_fits, log_data, without_drift
 from armload.recording import Recording
 from armload.regression import Correction, JointFeatures, payload_prior_std
 from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH
-from armload.simulation import Run, World, simulate_many
+from armload.simulation import Run, Sensors, World, simulate_many
 from armload.simulation.resolution import COARSE
 from armload.survey.rows import answered
 
@@ -143,6 +144,19 @@ def test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples(youn
     assert all(set(one.marks) < set(marks) for one, marks in zip(kept, logs, strict=True))
 
 
+def test_long_streams_do_not_make_a_profile_forget_its_short_logs(young):
+    """Streams of whole shifts, over months: marks of 20 s are those by which a replay of them is known."""
+    rng = np.random.default_rng(2)
+    log = tuple(f"{x:012x}" for x in rng.integers(0, 1 << 47, 30))
+    kept: tuple = (replace(young.sessions[0], marks=log),)
+    for _ in range(40):
+        stream = tuple(f"{8 * x:012x}" for x in rng.integers(0, 1 << 44, 300))  # every eighth value, as a stream keeps
+        kept = remembered([*kept, replace(young.sessions[0], marks=stream)], most=2000)
+        assert sum(len(one.marks) for one in kept) <= 2000
+    assert kept[0].marks == log
+    assert all(len(one.marks) > 10 for one in kept)
+
+
 def test_a_session_that_is_added_is_held_against_the_drift_of_all_as_those_before_are(panda, life, young):
     """T ≤ deltaᵀ·D⁻¹·delta, and the k-th session's own delta² is part of (k + 3)·D, of which three count beforehand."""
     log = life[1][3]
@@ -150,6 +164,24 @@ def test_a_session_that_is_added_is_held_against_the_drift_of_all_as_those_befor
     grown = learn_profile(panda, [shifted], known=young)
     assert abs(grown.sessions[-1].offset[0]) > 1.0
     assert grown.sessions[-1].statistic <= 3 * panda.n * (len(grown.sessions) + 3)
+
+
+@pytest.mark.full  # some seconds
+def test_a_profile_that_is_added_to_for_weeks_still_knows_its_arm(panda, tmp_path):
+    """What the features cannot say repeats from day to day: it is told by how badly later days are foretold."""
+    rng, world = np.random.default_rng(3), World.real_like(panda, 3)
+    worlds = [replace(world, offset=world.offset + 0.5 * OFFSET * rng.normal(size=7)) for _ in range(13)]
+    motions, sensors = [random_motion(panda, 3000 + k, duration=22.0) for k in range(len(worlds))], Sensors.panda(panda)
+    runs = [Run(motion, None, on, sensors, k) for k, (motion, on) in enumerate(zip(motions, worlds, strict=True))]
+    logs = simulate_many(panda, runs, rate=100.0, duration=22.0, workers=1, resolution=COARSE)
+    grown = begun = learn_profile(panda, logs[:4])
+    for log in logs[4:]:
+        check_fits(grown, panda, log)
+        before, grown = grown, learn_profile(panda, [log], known=grown)
+        assert before.repeated <= grown.repeated <= 2.0 * before.repeated
+    assert grown.repeated > begun.repeated
+    assert begun.foretold is None
+    assert np.array_equal(load_profile(save_profile(grown, tmp_path / "arm.profile")).foretold, grown.foretold)
 
 
 @pytest.mark.full  # some seconds

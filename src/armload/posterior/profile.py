@@ -25,8 +25,9 @@ from armload.regression.information import RegressionData, Session
 from armload.regression.lag import GAIN
 from armload.regression.noise import SMOOTH, whole_noise
 
-# marks of samples that a profile remembers, 0.8 MB of its file: with more, every other one is forgotten, the samples
-# themselves decide which (test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples)
+# marks of samples that a profile remembers, 0.8 MB of its file: with more, every other one of the session with the most
+# is forgotten, the samples themselves decide which
+# (test_a_profile_of_many_logs_remembers_a_bounded_number_of_their_samples)
 MARKS = 50_000
 _SAME_MASS = 1e-3  # [kg] tools whose masses differ by less are one
 
@@ -71,6 +72,8 @@ class Profile:
         sessions: what it was learned from. poses: (P, n) where the arm was seen [rad].
         gain_joint_std: (n,) standard deviation of each joint's gamma: a joint that hardly bears the weight keeps its
             prior. None: no weight, or a profile of an earlier version.
+        foretold: (7,) log density of the sessions that were added, as the profile before each foretold them, by each of
+            the factors that `repeated` may be (`foretold.REPEATED`). None: none was added, or by an earlier version.
     """
 
     arm_name: str
@@ -90,6 +93,7 @@ class Profile:
     gain: NDArray[np.float64] | None = None
     gain_std: float | None = None
     gain_joint_std: NDArray[np.float64] | None = None
+    foretold: NDArray[np.float64] | None = None
 
     @property
     def duration(self) -> float:
@@ -197,15 +201,21 @@ class Profile:
 
 
 def remembered(sessions: Iterable[SessionRecord], most: int = MARKS) -> tuple[SessionRecord, ...]:
-    """The sessions with at most so many marks: of all alike those of every other, fourth, eighth value are kept."""
-    kept = tuple(sessions)
+    """The sessions with at most so many marks.
+
+    Of the session with the most marks those of every other, fourth, eighth value are kept, so that long streams do not
+    make short logs be forgotten.
+    """
+    kept = list(sessions)
     while sum(len(one.marks) for one in kept) > most:
-        values = [int(mark, 16) for one in kept for mark in one.marks]
+        k = max(range(len(kept)), key=lambda i: len(kept[i].marks))
+        values = [int(mark, 16) for mark in kept[k].marks]
         every = 2
         while all(value % every == 0 for value in values):
             every *= 2
-        kept = tuple(replace(one, marks=tuple(m for m in one.marks if int(m, 16) % every == 0)) for one in kept)
-    return kept
+        marks = tuple(mark for mark, value in zip(kept[k].marks, values, strict=True) if value % every == 0)
+        kept[k] = replace(kept[k], marks=marks)
+    return tuple(kept)
 
 
 def attached_mass(arm: Arm) -> float:

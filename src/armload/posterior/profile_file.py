@@ -48,6 +48,8 @@ def save_profile(profile: Profile, path: str | PathLike[str]) -> Path:
         tensors["gain"] = profile.gain
     if profile.gain_joint_std is not None:
         tensors["gain_joint_std"] = profile.gain_joint_std
+    if profile.foretold is not None:
+        tensors["foretold"] = profile.foretold
     header = {
         "arm": {
             "name": profile.arm_name,
@@ -101,6 +103,7 @@ def _profile(tensors: dict[str, NDArray], header: dict[str, Any]) -> Profile:
         tensors.get("gain"),
         header["gain_std"],
         tensors.get("gain_joint_std"),
+        tensors.get("foretold"),
     )
 
 

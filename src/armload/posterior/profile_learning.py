@@ -7,11 +7,9 @@ integrated out joint by joint, as it is each joint's own (`without_drift`), and 
 D and S are found by expectation–maximisation with stated priors.
 
 How many features the pose has, and by which factor the noise counts for more because what the features cannot say
-repeats, is chosen by logs left out: the density of their block means as the others predict them, all blocks of a log
-together. So the long-run variance is estimated, and capacity follows the data.
+repeats, is chosen by logs left out (`foretold`). So the long-run variance is estimated, and capacity follows the data.
 
-Sources: Bishop 2006, ch. 3 and 9 (information form, EM); Geisser & Eddy, JASA 1979 (predictive density of what is left
-out).
+Source: Bishop 2006, ch. 3 and 9 (information form, EM).
 """
 
 from __future__ import annotations
@@ -25,6 +23,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm, rated_effort
 from armload.errors import IdentificationError
 from armload.posterior.drift import SESSION
+from armload.posterior.foretold import REPEATED, Foreteller
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, attached_mass, fingerprint, remembered
 from armload.posterior.profile_agreement import carried, check_agree
@@ -40,8 +39,6 @@ from armload.runtime.one_thread import one_thread
 # features of the pose that a profile may have; the first is that of a single tare. A stream's row takes a third of a
 # millisecond at the last
 CAPACITIES = (128, 256, 384)
-# by which factor the noise of a log may count for more, by steps that a density can tell apart
-REPEATED = tuple(2.0**k for k in range(7))
 # sessions that are learned together, whose own offsets and friction are unknowns of one solution: memory grows with the
 # square of their number and faster, 1 GB with 12 of a Panda, 2 with 24, 7 with 48. A stated bound: what is beyond is
 # added one after another, as to a profile that there is
@@ -49,8 +46,6 @@ AT_ONCE = 24
 _FEWEST = 4  # logs below which none is left out: then capacity and noise are those of a tare
 _FOLDS = 5  # into which the logs are parted
 _STEPS = 5  # of expectation–maximisation, as for a tare
-_PREDICTED = 1.0  # [s] of a block that is predicted: residuals stay correlated for about as long
-_MOST_BLOCKS = 64  # of a log: their covariance is a matrix
 
 
 @one_thread()
@@ -71,7 +66,7 @@ def learn_profile(
         mounted: (10,) the known tool of each log, about the arm's frame; None: there was none.
         sessions: a number for each log, logs of the same number are of one session; None: the logs' clocks tell, those
             without the time of day are sessions of their own.
-        known: a profile to go on from: its information grows, what was chosen for it stays.
+        known: a profile to go on from: its information grows, its features stay.
         progress: called as progress(done, total) after every log.
 
     Raises:
@@ -240,36 +235,10 @@ def _left_out(correction: Correction, data: list[RegressionData], fit: _Fit) -> 
         kept.b = sum(b for k, (_, b) in enumerate(own) if k not in out)  # type: ignore[assignment]
         for i, repeated in enumerate(REPEATED):
             kept.noise = np.full(n, repeated)
-            problem = Problem([kept], payload_prior_std(correction.arm), None, SMOOTH, same=True)
-            scales = replace(fit.scales, noise=kept.noise[None], drifts=np.zeros((0, 0)))
-            found, E = problem.posterior(scales), problem.selections[0]
-            for k in out:
-                means, times = _blocks(data[k])
-                for j in range(n):
-                    X, u = means[:, j, :-1], 10 + j + n * np.arange(len(fit.drift) // n)
-                    e = means[:, j, -1] - X[:, : len(E)] @ (E @ found.mean) - X[:, len(E) :] @ found.weights[j]
-                    V = found.covariance_of(E, j, X) + (X[:, u] * fit.drift[j::n]) @ X[:, u].T
-                    total[i] += _log_density(e, V + np.diag(fit.scales.noise[k, j] / times))
+            others = Foreteller(kept, fit.scales, fit.drift)
+            total[i] += sum(others.log_density(data[k], fit.scales.noise[k]) for k in out)
     best = int(np.argmax(total))
     return float(total[best]), REPEATED[best]
-
-
-def _log_density(e: NDArray[np.float64], V: NDArray[np.float64]) -> float:
-    """Of e under N(0, V), but for a constant."""
-    L = np.linalg.cholesky(V)
-    white = np.linalg.solve(L, e)
-    return -0.5 * float(white @ white) - float(np.log(np.diag(L)).sum())
-
-
-def _blocks(data: RegressionData) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Means (B, n, size + 1) and durations (B,) of blocks of `_PREDICTED` or longer, `_MOST_BLOCKS` at most."""
-    means, times, _ = data.blocks.means()
-    each = max(round(_PREDICTED / data.blocks.block), -(-len(times) // _MOST_BLOCKS), 1)
-    each = min(each, len(times))
-    whole = len(times) // each * each
-    sums = (means[:whole] * times[:whole, None, None]).reshape(-1, each, *means.shape[1:]).sum(axis=1)
-    total = times[:whole].reshape(-1, each).sum(axis=1)
-    return sums / total[:, None, None], total
 
 
 def _records(

@@ -19,6 +19,7 @@ from armload.inertia import HELD, Z95
 from armload.posterior.another_arm import another_arm
 from armload.posterior.calibration import KAPPA_UNKNOWN
 from armload.posterior.drift import drift_of
+from armload.posterior.foretold import counting_repeats
 from armload.posterior.problem import Problem
 from armload.posterior.profile import Profile, SessionRecord, remembered
 from armload.posterior.scales import Drift, Posterior
@@ -73,16 +74,20 @@ def with_session(
 ) -> Profile:
     """A profile and one more session, whose rows have the profile's features; the scales stay, the drift's size learns.
 
+    By how much noise counts for more learns, too (`counting_repeats`).
+
     Args:
         data: of the session. logs: it came from, for their names and poses. name: of a session that is no log.
         marks: of its samples (`mark_of`).
     """
     data.session = known.session(correction, len(known.sessions) + 1)
-    runs = [known.data(correction, GAIN, SMOOTH.block), data]
-    problem = Problem(runs, payload_prior_std(correction.arm), None, replace(SMOOTH, novelty=np.inf), same=True)
+    problem = _beside(known, correction, data)
     scales = problem.scales(known.scales)
     for _ in range(2):
         scales = replace(scales, noise=problem.improved(scales, problem.posterior(scales)).noise)
+    before, known = known, counting_repeats(known, correction, data, scales.noise[-1])
+    if known.repeated != before.repeated:
+        problem = _beside(known, correction, data)
     found = problem.posterior(scales)
     means, P = found.mean[problem.eta.stop :], found.covariance[problem.eta.stop :, problem.eta.stop :]
     S, seen = scales.noise[-1], len(known.sessions) + STATED
@@ -97,6 +102,12 @@ def with_session(
         sessions=remembered([*known.sessions, record(correction, means, P + np.diag(drift), S, *about)]),
         poses=np.concatenate([known.poses, *(poses(log) for log in logs)]),
     )
+
+
+def _beside(known: Profile, correction: Correction, data: RegressionData) -> Problem:
+    """A session's rows and what the profile says, of the same body."""
+    runs = [known.data(correction, GAIN, SMOOTH.block), data]
+    return Problem(runs, payload_prior_std(correction.arm), None, replace(SMOOTH, novelty=np.inf), same=True)
 
 
 def record(
