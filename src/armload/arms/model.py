@@ -115,6 +115,11 @@ class Arm:
         """Names of all links, each a possible payload frame if joints move it."""
         return self._frames  # type: ignore[attr-defined]
 
+    @property
+    def fixed_frames(self) -> tuple[str, ...]:
+        """Names of the links that move with the payload frame: no joint lies between."""
+        return self._rigid  # type: ignore[attr-defined]
+
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of the masses, geometry, frame and gravity: two arms with the same one give the same torques."""
@@ -201,7 +206,7 @@ class Arm:
             return InertialParameters(parameters.phi, self.frame)
         if there not in self.frames:
             raise ArmError(f"{self.name} has no frame {there!r}: expected one of {', '.join(self.frames)}")
-        if there not in self._rigid:  # type: ignore[attr-defined]
+        if there not in self.fixed_frames:
             raise ArmError(
                 f"frame {there!r} does not move with {self.frame!r}, joints lie between the two: a payload must sit "
                 "behind the last joint"
