@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms.description import read_chain
 from armload.arms.given import check_limits, check_number, gravity_of
 from armload.arms.limits import Limits
-from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, placement_of
+from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, carrier_pose, placement_of
 from armload.errors import ArmError
 from armload.inertia import InertialParameters, Inexact, from_order, parameters_only
 from armload.runtime.real_numbers import own_reals, reals
@@ -147,6 +147,11 @@ class Arm:
         return np.array(
             [from_order(self._model.inertias[k].toDynamicParameters(), "pinocchio").phi for k in range(1, self.n + 1)]
         )
+
+    @property
+    def base_pose(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rotation (3, 3) and position (3,) [m] of the link that carries the first joint, in the root of the file."""
+        return carrier_pose(self._model)
 
     @property
     def horizontal(self) -> NDArray[np.float64]:
