@@ -307,7 +307,7 @@ def test_of_what_joints_in_another_order_look_like_that_is_said():
     assert "another order" not in removal("tare")
 
 
-def test_of_an_arm_that_changed_it_is_said_what_the_intervals_do_not_allow_for():
+def test_of_an_arm_that_changed_it_is_said_what_the_intervals_do_not_allow_for(panda):
     drift = Drift(np.full(7, 0.1), np.zeros(7), 40.0, 0, True)
-    assert "the intervals allow for it, but not for another arm's links" in (arm_changed(drift, None) or "")
-    assert "another arm" not in (arm_changed(replace(drift, allowed=False), None) or "another arm")
+    assert "the intervals allow for it, but not for another arm's links" in (arm_changed(panda, drift, None) or "")
+    assert "another arm" not in (arm_changed(panda, replace(drift, allowed=False), None) or "another arm")

@@ -131,7 +131,7 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
     """What the answer itself shows, most telling first."""
     if is_removal(found.estimate, mass_determined):
         return removal(relative_to)
-    changed = arm_changed(found.drift, found.another, found.arm_known)
+    changed = arm_changed(arm, found.drift, found.another, found.arm_known)
     sound = found.exchanged or found.explained
     doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint, relative_to)
     if doubt is not None:
