@@ -87,6 +87,7 @@ class Arm:
         object.__setattr__(self, "_joint_names", chain.joint_names)
         object.__setattr__(self, "_frames", chain.frames)
         object.__setattr__(self, "_rigid", chain.rigid)
+        object.__setattr__(self, "_held", chain.held)
         if self.attached is not None and self.attached.frame in set(chain.frames) - {chain.frame}:
             object.__setattr__(self, "attached", replace(self, attached=None).in_frame(self.attached))
         if self.attached is None:
@@ -119,6 +120,11 @@ class Arm:
     def fixed_frames(self) -> tuple[str, ...]:
         """Names of the links that move with the payload frame: no joint lies between."""
         return self._rigid  # type: ignore[attr-defined]
+
+    @property
+    def held(self) -> tuple[tuple[str, int], ...]:
+        """Joints off the chain, which count as standing at zero; how many of the arm's joints carry each of them."""
+        return self._held  # type: ignore[attr-defined]
 
     @cached_property
     def fingerprint(self) -> str:

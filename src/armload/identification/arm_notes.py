@@ -103,6 +103,22 @@ def leaning(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
     return gravity_doubted(arm, tilt, torque)
 
 
+def carries_more(arm: Arm) -> list[str]:
+    """That joints of the arm carry others than its own, as a torso does: what these move looks like a fault of its own.
+
+    Joints behind the last one, such as fingers, are not meant.
+    """
+    others = [(name, carriers) for name, carriers in arm.held if 0 < carriers < arm.n]
+    if not others:
+        return []
+    which = others[0][0] if len(others) == 1 else f"{others[0][0]} … {others[-1][0]}"
+    bearing = arm.joint_names[: max(carriers for _, carriers in others)]
+    return [
+        f"{', '.join(bearing)} also bear{'s' * (len(bearing) == 1)} what {which} move{'s' * (len(others) == 1)}, which "
+        "counts as standing at zero: hold it still, in the log and as in its tare, before you believe what is doubted"
+    ]
+
+
 def driven_by_friction(joints: tuple[int, ...]) -> str:
     """That friction drives joints, from 1, where it must brake them: a sign is turned."""
     several = len(joints) > 1
