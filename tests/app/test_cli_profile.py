@@ -120,9 +120,9 @@ def test_that_answers_with_a_profile_of_motor_currents_are_approximate_is_said_w
 
 def test_a_figure_is_of_the_profile_s_own_arm_in_the_form_that_its_name_says(profile, capsys, tmp_path):
     show = ["profile", "show", str(profile), "--figure"]
-    for robot in ("fr3", "ur5e"):
+    for robot, frame in (("fr3", "fr3_link8"), ("ur5e", "tool0")):
         assert main([*show, str(tmp_path / "arm.png"), "--robot", robot]) == 2
-        assert "the profile is of panda" in capsys.readouterr().err
+        assert f"the profile is of panda to panda_link8: {robot} to {frame} is another arm" in capsys.readouterr().err
     assert main([*show, str(tmp_path / "arm.txt")]) == 2
     said = capsys.readouterr()
     assert said.out == ""

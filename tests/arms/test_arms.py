@@ -20,13 +20,17 @@ from armload.arms import (
     full_arm_regressor,
     momentum_regressor,
     payload_regressor,
+    prefixed_frame,
     rated_effort,
     rated_mass,
 )
+from armload.arms.facts import description_of
 from armload.arms.strength import poses
+from armload.devices.guard import flange_of
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
 from armload.payloads import franka_hand, hand_on
+from armload.posterior import HybridModel
 from armload.regression import FilteredRegression, first_order_lag
 
 LEVEL, TILTED = (0.0, 0.0, -9.81), (3.0, -2.0, -9.1)
@@ -671,6 +675,39 @@ def test_a_known_arm_whose_links_and_joints_have_a_prefix_is_that_arm(tmp_path):
     found = arm(tmp_path / "two_arms.urdf", "left_tool0")
     assert found.joint_names == tuple(f"left_{name}" for name in known.joint_names)
     assert (found.known_as, found.rated_payload, found.motor_torque) == ("ur10e", 12.5, True)
+
+
+def side_by_side(tmp_path, *arms):
+    """A file of several built-in arms (name, pattern of names, how they are called) on one table."""
+    parts = [link("table")]
+    for name, old, new in arms:
+        text = description_of(name)
+        inside = text[text.index(">", text.index("<robot")) + 1 : text.rindex("</robot>")]
+        parts.append(re.sub(rf'(name|link)="{old}', rf'\1="{new}', inside))
+        base = re.search(r'<link name="([^"]*)"', parts[-1])[1]
+        parts.append(joint(f"{base}_place", "fixed", "table", base, xyz="0 0.5 0.4"))
+    path = tmp_path / "cell.urdf"
+    path.write_text(robot(*parts))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("arms", "frames"),
+    [
+        ((("panda", "", "left_"), ("panda", "", "right_")), ("left_panda_link8", "right_panda_link8")),
+        ((("panda", "panda_", "panda_1_"), ("panda", "panda_", "panda_2_")), ("panda_1_link8", "panda_2_link8")),
+        ((("ur5e", "", ""), ("ur10e", "", "right_")), ("tool0", "right_tool0")),
+        ((("iiwa7", "", "left_"), ("panda", "", "")), ("left_lbr_link_ee", "panda_link8")),
+    ],
+)
+def test_each_of_two_known_arms_in_a_file_is_that_arm(tmp_path, arms, frames):
+    path = side_by_side(tmp_path, *arms)
+    for (name, _, _), frame in zip(arms, frames, strict=True):
+        found, known = arm(path, frame), arm(name)
+        facts = ("known_as", "rated_payload", "link_spread", "motor_torque", "acceleration", "jerk")
+        assert [getattr(found, fact) for fact in facts] == [getattr(known, fact) for fact in facts]
+        assert flange_of(found) == prefixed_frame(found, known.frame) == found.frame == frame
+        assert HybridModel.load(HybridModel.shipped(found)).into_frame(found) is None
 
 
 def called(tmp_path, name, old, new):

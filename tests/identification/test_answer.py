@@ -8,8 +8,9 @@ import pytest
 
 import armload
 from armload import HybridIdentifier, OnlineIdentifier, arm, write_recording
+from armload.arms import Arm
 from armload.identification import identify
-from armload.identification.arm_notes import arm_changed, gravity_turned
+from armload.identification.arm_notes import arm_changed, carries_more, gravity_turned
 from armload.identification.intervals import intervals
 from armload.identification.reporting import removal
 from armload.identification.thresholds import FARTHEST
@@ -307,7 +308,50 @@ def test_of_what_joints_in_another_order_look_like_that_is_said():
     assert "another order" not in removal("tare")
 
 
-def test_of_an_arm_that_changed_it_is_said_what_the_intervals_do_not_allow_for():
+def test_of_an_arm_that_changed_it_is_said_what_the_intervals_do_not_allow_for(panda):
     drift = Drift(np.full(7, 0.1), np.zeros(7), 40.0, 0, True)
-    assert "the intervals allow for it, but not for another arm's links" in (arm_changed(drift, None) or "")
-    assert "another arm" not in (arm_changed(replace(drift, allowed=False), None) or "another arm")
+    assert "the intervals allow for it, but not for another arm's links" in (arm_changed(panda, drift, None) or "")
+    assert "another arm" not in (arm_changed(panda, replace(drift, allowed=False), None) or "another arm")
+
+
+def torso():
+    """A lift that carries two arms; the left one has a finger."""
+
+    def link(name):
+        inertia = '<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/>'
+        return f'<link name="{name}"><inertial><origin xyz="0.1 0 0"/><mass value="2"/>{inertia}</inertial></link>'
+
+    def joint(name, kind, parent, child):
+        ends = f'<parent link="{parent}"/><child link="{child}"/><origin xyz="0.2 0 0.1"/><axis xyz="0 1 0"/>'
+        return (
+            f'<joint name="{name}" type="{kind}">{ends}<limit lower="-2" upper="2" effort="90" velocity="3"/></joint>'
+        )
+
+    joints = [("lift", "prismatic", "base", "torso")]
+    for side in ("left", "right"):
+        joints.append((f"{side}_1", "revolute", "torso", f"{side}_upper"))
+        joints.append((f"{side}_2", "revolute", f"{side}_upper", f"{side}_hand"))
+    joints.append(("left_finger", "prismatic", "left_hand", "left_tip"))
+    links = "".join(link(child) for *_, child in joints)
+    return f'<robot name="torso"><link name="base"/>{links}{"".join(joint(*each) for each in joints)}</robot>'
+
+
+def test_what_a_torso_carries_beside_the_arm_is_named_with_what_is_doubted(monkeypatch):
+    cell = Arm("torso", torso(), "left_hand")
+    assert cell.held == (("right_1", 1), ("right_2", 1), ("left_finger", 3))
+    assert replace(cell, gravity=(0.0, 0.0, -9.7)).held == cell.held
+    (said,) = carries_more(cell)
+    assert said.startswith("lift also bears what right_1 … right_2 move, which counts as standing at zero")
+    t = np.linspace(0.0, 4.0, 401)
+    q = np.stack([0.2 * np.sin(t), np.sin(1.3 * t), np.sin(1.7 * t)], axis=1)
+    dq, ddq = (np.gradient(x, t, axis=0) for x in (q, np.gradient(q, t, axis=0)))
+    log = Recording(t, q, dq, cell.torque(q, dq, ddq))
+    assert said not in identify(log, cell).notes
+    monkeypatch.setattr("armload.identification.reporting._doubts", lambda *_: ["doubted"])
+    assert identify(log, cell).notes[:2] == ("doubted", said)
+
+
+def test_arms_that_no_joint_carries_beside_each_other_and_fingers_are_not_named(panda):
+    beside = torso().replace('name="lift" type="prismatic"', 'name="lift" type="fixed"')
+    assert carries_more(Arm("cell", beside, "left_hand")) == []
+    assert carries_more(panda) == []

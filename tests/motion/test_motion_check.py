@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armload.arms import arm
+from armload.arms import Arm, arm
 from armload.devices.ros2.trajectory import TrajectoryMotion
 from armload.errors import MotionError
 from armload.inertia import InertialParameters
@@ -274,3 +274,29 @@ def test_a_urdf_without_effort_or_velocity_limits_gets_a_random_motion(tmp_path)
     assert check.ok
     assert np.all(check.peak["velocity"] <= 1.5)
     assert np.all(np.isinf(check.margin["torque"]))
+
+
+def mounted(name, xyz, rpy):
+    """A built-in arm that its file mounts somewhere in a cell."""
+    known = arm(name)
+    base = re.search(r'<link name="([^"]*)"', known.urdf)[1]
+    place = (
+        f'<link name="cell"/><joint name="place" type="fixed"><origin xyz="{xyz}" rpy="{rpy}"/><parent link="cell"/>'
+        f'<child link="{base}"/></joint>'
+    )
+    return Arm(name, known.urdf.replace("</robot>", place + "</robot>"), known.frame)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur10e"])
+@pytest.mark.parametrize(("xyz", "rpy"), [("3 0 0", "0 0 1"), ("0 0 2.2", "3.14159265358979 0 0"), ("0 1 1", "0 1 0")])
+def test_an_arm_is_as_large_wherever_its_file_mounts_it(name, xyz, rpy):
+    there, known = capsule_arm(mounted(name, xyz, rpy)), capsule_arm(arm(name))
+    np.testing.assert_allclose(there.radius, known.radius, atol=1e-12)
+    poses = np.random.default_rng(0).uniform(-2.5, 2.5, size=(20, known.arm.n))
+    np.testing.assert_allclose(there.clearance(poses).self, known.clearance(poses).self, atol=1e-9)
+
+
+def test_a_panda_that_hangs_from_the_root_has_no_floor_at_the_root():
+    hanging = check_motion(mounted("panda", "0 0 0", "3.14159265358979 0 0"), taie2024())
+    assert hanging.floor_clearance == np.inf
+    assert hanging.ok, hanging.problems

@@ -1,6 +1,7 @@
 """An arm on a linear axis: metres and newtons of the joint that slides, radians and N·m of those that turn."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,14 +10,19 @@ from armload.app.cli import main
 from armload.app.cli.motion_check import passed
 from armload.app.cli.profile_text import next_steps
 from armload.arms import Arm, arm
+from armload.devices import Supervision, Thresholds
 from armload.errors import MotionError, RecordingError
 from armload.excitation import Constraints, PayloadRange, problems
 from armload.excitation.verification import used
 from armload.identification import check_plausible
+from armload.identification.arm_notes import arm_changed
+from armload.identification.notes import torques_drift
 from armload.lab.report.motion_figure import motion_figure
-from armload.motion import PathMotion, check_motion, random_motion, save_motion
+from armload.motion import Course, PathMotion, StraightMotion, check_motion, random_motion, save_motion
+from armload.online import Gate
 from armload.posterior import learn_profile
-from armload.recording import ColumnSpec, Recording, read_recording
+from armload.posterior.scales import Drift
+from armload.recording import ColumnSpec, Recording, Sample, read_recording
 from armload.recording.currents import in_si
 
 
@@ -199,3 +205,52 @@ def test_a_joint_that_slides_is_not_asked_to_move_by_half_a_radian(lift):
     tau = lift.torque(q, dq, ddq) + 0.5 * np.tanh(dq / 0.05)
     said = [line for line in next_steps(learn_profile(lift, [Recording(t, q, dq, tau)]), lift) if "radian" in line]
     assert said == ["joint 2 moved by less than half a radian in all logs: move it further"]
+
+
+def test_what_is_doubted_of_a_joint_that_slides_is_in_newtons(lift):
+    def changed(joint):
+        return arm_changed(lift, Drift(np.full(2, 24.0), np.full(2, 0.8), 90.0, joint, True), None)
+
+    assert "the torque's offset differs by +24 N, the friction by +0.8 N;" in changed(0)
+    assert "the torque's offset differs by +24 N·m, the friction by +0.8 N·m;" in changed(1)
+    assert "that of joint 1, by +5 N from" in torques_drift(lift, 1, 5.0, 1)
+    assert "that of joint 2, by +5 N·m from" in torques_drift(lift, 2, 5.0, 1)
+
+
+def test_what_no_joint_that_slides_can_do_is_said_in_metres_and_newtons(lift):
+    def why(q=(0.3, 0.0), dq=(0.0, 0.0), tau=(60.0, 0.0)):
+        return Gate(lift).why("implausible", 0.0, q, dq, tau)
+
+    assert why(q=(90.0, 0.0)) == "position of joint 1 is 90 m, beyond its limits"
+    assert why(dq=(1e4, 0.0)).startswith("velocity of joint 1 is 1e+04 m/s,")
+    assert why(tau=(1e6, 0.0)).startswith("torque of joint 1 is 1e+06 N,")
+    assert why(tau=(60.0, 1e6)).startswith("torque of joint 2 is 1e+06 N·m,")
+
+
+@pytest.mark.parametrize(
+    ("speed", "force", "says"),
+    [
+        (1.0, 3e3, r"\(300 N\): expected joint force in N of lift"),
+        (5.0, 60.0, r"dq1 = 5 m/s at .* \(0\.8 m/s\): expected m/s of lift$"),
+    ],
+)
+def test_a_log_beyond_what_a_joint_that_slides_can_do_is_refused_in_its_units(lift, speed, force, says):
+    t = np.linspace(0.0, 2.0, 401)
+    q = np.stack([0.3 + 0.2 * np.sin(speed / 0.2 * t), np.sin(t)], axis=1)
+    dq = np.stack([speed * np.cos(speed / 0.2 * t), np.cos(t)], axis=1)
+    tau = np.stack([force + np.sin(t), 0.1 * np.cos(t)], axis=1)
+    with pytest.raises(RecordingError, match=says):
+        check_plausible(Recording(t, q, dq, tau), lift)
+
+
+def test_a_joint_that_slides_off_its_path_is_stopped_in_metres_and_newtons(lift):
+    motion = StraightMotion(np.array([0.1, 0.0]), np.array([0.4, 0.5]), 3.0)
+    course, q = Course(motion, lift.limits), motion.position([0.0])[0]
+    still, held = np.zeros(2), lift.torque(q)
+    off = Supervision(lift, motion, Thresholds()).problem(
+        0.0, Sample(0.0, q + np.array([0.2, 0.0]), still, held), course
+    )
+    assert off.startswith("up is 0.200 m off the path (more than 0.05 m")
+    watch, pushed = Supervision(lift, motion, Thresholds()), held + np.array([500.0, 0.0])
+    said = [watch.problem(t, Sample(t, q, still, pushed), course) for t in (0.0, 0.01, 0.03)]
+    assert re.match(r"up feels \d+\.\d N beside .* \(more than \d+\.\d N\)", said[-1])

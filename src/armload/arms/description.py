@@ -29,6 +29,7 @@ class Chain:
     """A URDF without meshes whose only moving joints lead from the root to the payload frame.
 
     rigid: the links that move with the payload frame, all joints between fixed.
+    held: the joints that could move beside it, and how many of the chain's joints move what carries each of them.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Chain:
     joint_names: tuple[str, ...]
     frames: tuple[str, ...]
     rigid: tuple[str, ...]
+    held: tuple[tuple[str, int], ...]
 
 
 def read_chain(xml: str, frame: str | None, where: str) -> Chain:
@@ -122,6 +124,9 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
             link = parents[link]
         return joints[link].get("name") if link in joints else None
 
+    def carried(link: str) -> int:
+        return sum(joint in moving for joint in path(link))
+
     return Chain(
         name=root.get("name") or "robot",
         xml=ET.tostring(root, encoding="unicode"),
@@ -129,6 +134,7 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
         joint_names=tuple(str(j.get("name")) for j in moving),
         frames=tuple(links),
         rigid=tuple(link for link in links if base(link) == moving[-1].get("name")),
+        held=tuple((str(j.get("name")), carried(parents[k])) for k, j in joints.items() if HELD in j.attrib),
     )
 
 

@@ -34,11 +34,16 @@ def link_fingerprint(arm: Arm) -> str:
 
 
 def prefixed_frame(arm: Arm, frame: str) -> str | None:
-    """The arm's frame of this name, with or without a prefix; None: there is none, or there are several."""
-    if frame in arm.frames:
+    """What an arm calls a frame that moves with its payload's; None: there is none, or there are several.
+
+    By this name, with a prefix, or, of a built-in arm's flange, with such a flange's ending. What another arm of the
+    file calls so is not meant.
+    """
+    endings = (frame, *(facts.flange_ending for facts in ARMS.values() if facts.flange == frame))
+    if frame in arm.fixed_frames:
         return frame
-    found = [name for name in arm.frames if name.endswith(frame)]
-    return found[0] if len(found) == 1 else None
+    found = ([name for name in arm.fixed_frames if name.endswith(ending)] for ending in endings)
+    return next((names[0] for names in found if len(names) == 1), None)
 
 
 def flange_named(arm: Arm, sheets: Iterable[ArmFacts], beside: str | None = None) -> str | None:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms.description import read_chain
 from armload.arms.given import check_limits, check_number, gravity_of
 from armload.arms.limits import Limits
-from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, placement_of
+from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, carrier_pose, placement_of
 from armload.errors import ArmError
 from armload.inertia import InertialParameters, Inexact, from_order, parameters_only
 from armload.runtime.real_numbers import own_reals, reals
@@ -87,6 +87,7 @@ class Arm:
         object.__setattr__(self, "_joint_names", chain.joint_names)
         object.__setattr__(self, "_frames", chain.frames)
         object.__setattr__(self, "_rigid", chain.rigid)
+        object.__setattr__(self, "_held", chain.held)
         if self.attached is not None and self.attached.frame in set(chain.frames) - {chain.frame}:
             object.__setattr__(self, "attached", replace(self, attached=None).in_frame(self.attached))
         if self.attached is None:
@@ -115,6 +116,16 @@ class Arm:
         """Names of all links, each a possible payload frame if joints move it."""
         return self._frames  # type: ignore[attr-defined]
 
+    @property
+    def fixed_frames(self) -> tuple[str, ...]:
+        """Names of the links that move with the payload frame: no joint lies between."""
+        return self._rigid  # type: ignore[attr-defined]
+
+    @property
+    def held(self) -> tuple[tuple[str, int], ...]:
+        """Joints off the chain, which count as standing at zero; how many of the arm's joints carry each of them."""
+        return self._held  # type: ignore[attr-defined]
+
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of the masses, geometry, frame and gravity: two arms with the same one give the same torques."""
@@ -142,6 +153,11 @@ class Arm:
         return np.array(
             [from_order(self._model.inertias[k].toDynamicParameters(), "pinocchio").phi for k in range(1, self.n + 1)]
         )
+
+    @property
+    def base_pose(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rotation (3, 3) and position (3,) [m] of the link that carries the first joint, in the root of the file."""
+        return carrier_pose(self._model)
 
     @property
     def horizontal(self) -> NDArray[np.float64]:
@@ -201,7 +217,7 @@ class Arm:
             return InertialParameters(parameters.phi, self.frame)
         if there not in self.frames:
             raise ArmError(f"{self.name} has no frame {there!r}: expected one of {', '.join(self.frames)}")
-        if there not in self._rigid:  # type: ignore[attr-defined]
+        if there not in self.fixed_frames:
             raise ArmError(
                 f"frame {there!r} does not move with {self.frame!r}, joints lie between the two: a payload must sit "
                 "behind the last joint"

@@ -80,6 +80,13 @@ def placement_of(model: pin.Model, frame: str) -> pin.SE3:
     return model.frames[model.getFrameId(frame, pin.FrameType.BODY)].placement
 
 
+def carrier_pose(model: pin.Model) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rotation (3, 3) and position (3,) [m] in the root of the link that carries the first joint."""
+    joint = model.frames[model.getFrameId(model.names[1], pin.FrameType.JOINT)]
+    carrier = model.frames[joint.parentFrame].placement
+    return carrier.rotation.copy(), carrier.translation.copy()
+
+
 def body_motions(
     model: pin.Model, data: pin.Data, gravity: Sequence[float], q: NDArray[np.float64], bodies: Sequence[Body]
 ) -> list[BodyMotion]:

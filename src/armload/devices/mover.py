@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.devices.load import Load
 from armload.devices.source import Source
 from armload.devices.supervision import SILENCE, Supervision, Thresholds
@@ -215,9 +216,10 @@ def check_start(mover: Mover, motion: Motion) -> NDArray[np.float64]:
     away = mover.commanded() - q[0]
     j = int(np.argmax(np.abs(away)))
     if not abs(away[j]) <= AT_START:
+        unit = unit_of("position", mover.arm.limits.slides[j])
         raise SafetyError(
-            f"{mover.arm.joint_names[j]} is {abs(away[j]):.3f} rad from where the motion {motion.name!r} begins: move "
-            "the arm to its start first" + (f", and where it does not get there, {mover.see}" if mover.see else "")
+            f"{mover.arm.joint_names[j]} is {abs(away[j]):.3f} {unit} from where the motion {motion.name!r} begins: "
+            "move the arm to its start first" + (f", and where it does not get there, {mover.see}" if mover.see else "")
         )
     return away
 

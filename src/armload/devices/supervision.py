@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor, rated_effort, rated_mass
+from armload.arms.units import unit_of
 from armload.errors import SafetyError
 from armload.motion import Course, Motion
 from armload.recording import Sample
@@ -97,10 +98,10 @@ class Supervision:
         k = int(np.argmin(away.max(axis=1)))
         j = int(np.argmax(away[k]))
         if away[k, j] > self._thresholds.tracking:
-            see = f"; {self.off}" if self.off else ""
+            see, unit = f"; {self.off}" if self.off else "", unit_of("position", self._arm.limits.slides[j])
             return (
-                f"{self._arm.joint_names[j]} is {away[k, j]:.3f} rad off the path (more than "
-                f"{self._thresholds.tracking:g} rad{see})"
+                f"{self._arm.joint_names[j]} is {away[k, j]:.3f} {unit} off the path (more than "
+                f"{self._thresholds.tracking:g} {unit}{see})"
             )
         return self._pushed(t, sample, course, float(last))
 
@@ -114,9 +115,10 @@ class Supervision:
         self._since = t if self._since is None else self._since
         if t - self._since < HOLD:
             return None
+        unit = unit_of("torque", self._arm.limits.slides[j])
         return (
-            f"{self._arm.joint_names[j]} feels {beyond[j]:.1f} N·m beside what a payload of "
-            f"{rated_mass(self._arm):.3g} kg can cause (more than {limit:.1f} N·m)"
+            f"{self._arm.joint_names[j]} feels {beyond[j]:.1f} {unit} beside what a payload of "
+            f"{rated_mass(self._arm):.3g} kg can cause (more than {limit:.1f} {unit})"
         )
 
     def beyond(self, sample: Sample, ddq: NDArray[np.float64], s: float) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.identification.thresholds import NOMINAL
 from armload.inertia import Z95
 from armload.posterior.scales import AnotherArm, Drift, Tilt
@@ -27,7 +28,7 @@ def held_against(profile: bool, tare: bool) -> str:
     return "both" if tare else "profile"
 
 
-def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "tare") -> str | None:
+def arm_changed(arm: Arm, drift: Drift | None, another: AnotherArm | None, what: str = "tare") -> str | None:
     """That the arm is not as it was at its tare, or as its profile says, how it differs, and what to do; None: it is.
 
     Args:
@@ -49,7 +50,10 @@ def arm_changed(drift: Drift | None, another: AnotherArm | None, what: str = "ta
     if drift is None or not drift.changed:
         return None
     j, allow = drift.joint, "allow for it, but not for another arm's links" if drift.allowed else "do not allow for it"
-    offset, friction = (f"{x:+.2g} N·m" if abs(x) >= 5e-4 else "nothing" for x in (drift.offset[j], drift.coulomb[j]))
+    unit = unit_of("torque", arm.limits.slides[j])
+    offset, friction = (
+        f"{x:+.2g} {unit}" if abs(x) >= 5e-4 else "nothing" for x in (drift.offset[j], drift.coulomb[j])
+    )
     if what != "both":  # a profile is of many days: what has changed within one is measured sooner
         as_it_is = "record a tare of this arm as it is now, with the same base and tool"
     return (
@@ -97,6 +101,22 @@ def leaning(arm: Arm, tilt: Tilt | None, torque: str) -> str | None:
     if tilt is not None and tilt.found:
         return gravity_turned(arm.gravity, arm.leaning(tilt.angles).gravity, False)
     return gravity_doubted(arm, tilt, torque)
+
+
+def carries_more(arm: Arm) -> list[str]:
+    """That joints of the arm carry others than its own, as a torso does: what these move looks like a fault of its own.
+
+    Joints behind the last one, such as fingers, are not meant.
+    """
+    others = [(name, carriers) for name, carriers in arm.held if 0 < carriers < arm.n]
+    if not others:
+        return []
+    which = others[0][0] if len(others) == 1 else f"{others[0][0]} … {others[-1][0]}"
+    bearing = arm.joint_names[: max(carriers for _, carriers in others)]
+    return [
+        f"{', '.join(bearing)} also bear{'s' * (len(bearing) == 1)} what {which} move{'s' * (len(others) == 1)}, which "
+        "counts as standing at zero: hold it still, in the log and as in its tare, before you believe what is doubted"
+    ]
 
 
 def driven_by_friction(joints: tuple[int, ...]) -> str:

@@ -187,7 +187,7 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
     if changes.drift is not None:
         answers = [
-            _doubted(answer, torques_drift(changes.drift.joint, changes.drift.torque, len(answers)))
+            _doubted(answer, torques_drift(arm, changes.drift.joint, changes.drift.torque, len(answers)))
             for answer in answers
         ]
     elif changes.doubted and not times:

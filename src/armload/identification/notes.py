@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.recording import Recording, blocks
@@ -36,12 +37,13 @@ MAY_CHANGE = (
 )
 
 
-def torques_drift(joint: int, torque: float, parts: int) -> str:
-    """That the torques drift within a log of so many parts, most of all that of a joint, from 1, by so much [N·m]."""
+def torques_drift(arm: Arm, joint: int, torque: float, parts: int) -> str:
+    """That the torques drift within a log of so many parts, most of all that of a joint, from 1, by `torque`."""
     where = "the log" if parts == 1 else "a part of the log"
+    unit = unit_of("torque", arm.limits.slides[joint - 1])
     return (
-        f"the torques drift within {where}, most of all that of joint {joint}, by {torque:+.2g} N·m from its start to "
-        "its end: an arm that warms up, a sensor that fails, or a payload that is filled or poured out; the answer "
+        f"the torques drift within {where}, most of all that of joint {joint}, by {torque:+.2g} {unit} from its start "
+        "to its end: an arm that warms up, a sensor that fails, or a payload that is filled or poured out; the answer "
         f"takes both for the same {'throughout' if parts == 1 else 'throughout each part'}: record it once more"
     )
 

@@ -201,11 +201,13 @@ def _check_speed(recording: Recording, arm: Arm) -> None:
         k, j = found
         speed = float(recording.dq[k : k + 1][0, j])
         degrees = np.all(np.percentile(np.abs(recording.dq[:]), 99, axis=0) / _DEGREE < limit)
-        unit = "; dq looks like degrees per second" if degrees and count > 0.05 * len(recording) else ""
+        slides = arm.limits.slides[j]
+        seems = degrees and not slides and count > 0.05 * len(recording)
+        unit, per_second = "; dq looks like degrees per second" if seems else "", unit_of("velocity", slides)
         raise RecordingError(
-            f"{recording.source}: dq{j + 1} = {speed:.4g} rad/s at {row_of(recording, k)} is more than "
-            f"{SPEED:g} times the limit of {arm.joint_names[j]} ({limit[j]:.4g} rad/s): expected rad/s of "
-            f"{arm.name}{unit}"
+            f"{recording.source}: dq{j + 1} = {speed:.4g} {per_second} at {row_of(recording, k)} is more than "
+            f"{SPEED:g} times the limit of {arm.joint_names[j]} ({limit[j]:.4g} {per_second}): expected "
+            f"{per_second} of {arm.name}{unit}"
         )
 
 

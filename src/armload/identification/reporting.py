@@ -13,6 +13,7 @@ from armload.identification.answer import Identification, body_of, is_removal
 from armload.identification.arm_notes import (
     another_model,
     arm_changed,
+    carries_more,
     driven_by_friction,
     gravity_turned,
     leaning,
@@ -62,7 +63,7 @@ def answered(
         low, high = low - np.r_[np.zeros(4), below], high + np.r_[np.zeros(4), above]
     found_of = intervals(phi, low, high, estimate.covariance, otherwise)
     doubts = _doubts(found, arm, determined[0], relative_to)
-    every_note = [*doubts, *notes, *([] if tared else without_mass(arm))]
+    every_note = [*doubts, *(carries_more(arm) if doubts else []), *notes, *([] if tared else without_mass(arm))]
     mass_std = float(estimate.std[0])
     if determined[0] and -HELD * mass_std <= estimate.phi[0] < -Z95 * mass_std:
         every_note.append(less_than_nothing(float(estimate.phi[0]), mass_std, relative_to))
@@ -131,7 +132,7 @@ def _doubt(found: Found, arm: Arm, mass_determined: bool, relative_to: str) -> s
     """What the answer itself shows, most telling first."""
     if is_removal(found.estimate, mass_determined):
         return removal(relative_to)
-    changed = arm_changed(found.drift, found.another, found.arm_known)
+    changed = arm_changed(arm, found.drift, found.another, found.arm_known)
     sound = found.exchanged or found.explained
     doubt = doubt_of(found.exchanged, sound, changed, found.restlessness, found.restless_joint, relative_to)
     if doubt is not None:

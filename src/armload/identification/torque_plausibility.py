@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import ARMS, Arm, rated_effort
+from armload.arms.units import called, unit_of
 from armload.errors import RecordingError
 from armload.identification.compensated import check_gravity_was_missing
 from armload.identification.exchanged import (
@@ -75,10 +76,11 @@ def _check_effort(recording: Recording, arm: Arm) -> None:
         j = int(np.argmax(most / arm.limits.effort))
         k = at[j]
         tau = float(recording.tau[k : k + 1][0, j])
+        unit, what = unit_of("torque", arm.limits.slides[j]), called("torque", arm.limits.slides[j])
         raise RecordingError(
             f"{recording.source}: tau{j + 1} = {tau:.4g} at {row_of(recording, k)} is "
             f"{most[j] / arm.limits.effort[j]:.3g} times the limit of {arm.joint_names[j]} "
-            f"({arm.limits.effort[j]:g} N·m): expected joint torque in N·m of {arm.name}"
+            f"({arm.limits.effort[j]:g} {unit}): expected joint {what} in {unit} of {arm.name}"
         )
 
 
@@ -133,17 +135,20 @@ def _check_no_torque_stands_still(recording: Recording, arm: Arm) -> None:
             own = np.ptp(arm.torque(recording.q[rows.ravel()])[:, j].reshape(rows.shape), axis=0)
             alone = FROZEN_LONGER * least < error[j] and held[k] > FROZEN_LONGER * np.delete(held, k).max(initial=0.0)
             if alone or own.max() > error[j] + FROZEN_LONGER * least:
-                raise _held_torque(recording, j, float(values[k]), mine, float(held[k]))
+                unit = unit_of("torque", arm.limits.slides[j])
+                raise _held_torque(recording, j, f"{values[k]:.4g} {unit}", float(values[k]), mine, float(held[k]))
 
 
-def _held_torque(recording: Recording, j: int, value: float, rows: NDArray[np.intp], time: float) -> RecordingError:
-    """That the torque of joint j is held at a value in stretches of rows (M, 2), `time` [s] in all."""
+def _held_torque(
+    recording: Recording, j: int, shown: str, value: float, rows: NDArray[np.intp], time: float
+) -> RecordingError:
+    """That the torque of joint j is held at a value, shown so, in stretches of rows (M, 2), `time` [s] in all."""
     low = min(float(tau[:, j].min()) for tau in parts_of(recording.tau))
     high = max(float(tau[:, j].max()) for tau in parts_of(recording.tau))
     if value in (low, high):
         end = f"its {'largest' if value == high else 'least'} value, for {time:.2f} s in all"
         return RecordingError(
-            f"{recording.source}: tau{j + 1} is exactly {value:.4g} N·m, {end}, first at "
+            f"{recording.source}: tau{j + 1} is exactly {shown}, {end}, first at "
             f"{row_of(recording, rows[0, 0])}, although joint {j + 1} moves: its sensor or logger is at its limit; "
             "expected the torque of every moment; record a slower motion, or a lighter payload"
         )

@@ -7,12 +7,13 @@ Capsules are coarse on purpose: a motion must stay clear of them by a margin, no
 - any other arm: one capsule from each joint origin to the next, with a radius of half its length, but between 2 % and
   4 % of the sum of these lengths (UR10e: 0.08 m for the upper arm, 0.06 m for the wrist).
 - what the arm holds: a ball of a given radius, centred 0.1 m beyond the payload frame along its z axis.
-- floor: the plane z = 0 of the base, on which the base is mounted (for an arm on a wall or ceiling: that wall).
+- base: the link that carries the first joint. What it is mounted on, and all else in the file, is not seen.
+- floor: the plane z = 0 of the file's root, on which the base is mounted (for an arm on a wall or ceiling: that wall).
 
 Neighbouring links share a joint and always touch, so they are not tested against each other; nor are links with so
-little between them that they touch whenever the arm folds. Of an arm without a size on its sheet, no two parts are
-tested that no pose brings `POSE_SELF` apart (a UR5's forearm and the ball), and no part against a floor that it is
-never `POSE_FLOOR` above (its shoulder): no motion could keep them clear.
+little between them that they touch whenever the arm folds. No part is tested against a floor that it is never
+`POSE_FLOOR` above (a UR5's shoulder, an arm that hangs from the root), and of an arm without a size on its sheet no two
+parts that no pose brings `POSE_SELF` apart (a UR5's forearm and the ball): no motion could keep them clear.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class CapsuleArm:
     """An arm as capsules, ready to be tested at many poses.
 
     link: (C,) the link that carries each capsule, 0 for the base, i for the link moved by joint i.
-    start, end: (C, 3) ends of the capsules' axes in the links' joint frames [m].
+    start, end: (C, 3) ends of the capsules' axes in the links' joint frames, of the base's in the file's root [m].
     radius: (C,) [m].
     pairs: (P, 2) capsules to test against each other.
     above: (F,) capsules to test against the floor.
@@ -69,7 +70,7 @@ class CapsuleArm:
 
         Args:
             q: (N, n) [rad].
-            floor: height of the floor in the base's frame [m]; None: there is none.
+            floor: height of the floor in the frame of the file's root [m]; None: there is none.
         """
         poses = np.atleast_2d(np.asarray(q, dtype=float))
         apart, pair = self._itself(poses)
@@ -100,6 +101,7 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
         payload_radius: radius of the ball around the payload [m]; 0: nothing is held.
     """
     origins = _joint_origins(arm)  # (n + 1, 3): of joint i + 1 in link i; the last is the payload frame in link n
+    turned, at = arm.base_pose
     length = np.linalg.norm(origins, axis=1)
     measured = _measured(origins)
     if measured is not None:
@@ -107,6 +109,7 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
     else:
         radius = np.clip(length / 2, _THIN * length.sum(), _THICK * length.sum())
         parts = [(link, np.zeros(3), origin, radius[link]) for link, origin in enumerate(origins)]
+    parts = [(link, *((a, b) if link else (at + turned @ a, at + turned @ b)), r) for link, a, b, r in parts]
     names = ["the base" if link == 0 else f"the link of {arm.joint_names[link - 1]}" for link, *_ in parts]
     if payload_radius > 0:
         R, _ = arm.link_poses(np.zeros((1, arm.n)))
@@ -129,10 +132,10 @@ def capsule_arm(arm: Arm, payload_radius: float = PAYLOAD_RADIUS) -> CapsuleArm:
 
     pairs = [pair for pair in combinations(range(len(parts)), 2) if not always_touch(*pair)]
     above = [(part, -1) for part, (link, *_) in enumerate(parts) if link >= 2]  # the rest only turns on the base
+    capsules = [_capsule(link, start, end, radius) for link, start, end, radius in parts]
+    above = _separable(arm, capsules, above, POSE_FLOOR)
     if measured is None:
-        capsules = [_capsule(link, start, end, radius) for link, start, end, radius in parts]
         pairs = _separable(arm, capsules, pairs, POSE_SELF)
-        above = _separable(arm, capsules, above, POSE_FLOOR)
     return CapsuleArm(
         arm,
         np.array([part[0] for part in parts]),
@@ -173,8 +176,9 @@ def _origins_of(name: str) -> NDArray[np.float64]:
 def _joint_origins(arm: Arm) -> NDArray[np.float64]:
     """Origin of each next joint in the frame of the link before it, and of the payload frame in the last link."""
     zero = np.zeros((1, arm.n))
+    turned, at = arm.base_pose
     R, p = arm.link_poses(zero)
     end = arm.frame_pose(zero)[1]
     points = np.concatenate([p[0], end])  # (n + 1, 3)
     steps = [R[0, i].T @ (points[i + 1] - points[i]) for i in range(arm.n)]
-    return np.array([points[0], *steps])
+    return np.array([turned.T @ (points[0] - at), *steps])

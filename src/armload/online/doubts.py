@@ -61,7 +61,7 @@ class Doubts:
             self._tilt, self._torque = stream.tilt, torque
         if self.arm_changed is None:
             self._than = held_against(run.profile is not None, relative_to == "tare")
-        self.arm_changed = arm_changed(self._drift, self.another, self._than)
+        self.arm_changed = arm_changed(self._arm, self._drift, self.another, self._than)
         moves = doubt_of(False, True, self.arm_changed, self._restlessness(run))
         doubts = moves, leaning(self._arm, self._tilt, torque)
         self.sentences = tuple(doubt for doubt in doubts if doubt is not None)

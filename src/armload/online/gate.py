@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.identification.thresholds import DEGREES_FROM, EFFORT
 from armload.recording import GAP, TURN, Sample, endless
 from armload.runtime.kernels import kernel
@@ -96,6 +97,7 @@ class Gate:
                 np.where(known, _JUMP_TIMES * limits.velocity, _ANY_VELOCITY),
             ]
         )
+        self._slides = limits.slides
         self._endless = np.flatnonzero(endless(arm))
         self.reset()
 
@@ -172,10 +174,12 @@ class Gate:
             if abs(now) > ANY_TIME:
                 return f"the time is {now:.3g} s"
             for k in np.flatnonzero((parts[0] < low) | (parts[0] > high)):
-                degrees = "; is it in degrees?" if np.abs(parts[0]).max() > DEGREES_FROM else ""
-                return f"position of joint {k + 1} is {parts[0][k]:.4g} rad, beyond its limits{degrees}"
-            for what, unit, x, most in zip(_PARTS[1:], ("rad/s", "N·m"), parts[1:], (velocity, effort), strict=True):
+                slides, far = self._slides[k], np.abs(parts[0]).max() > DEGREES_FROM
+                degrees, unit = "; is it in degrees?" if far and not slides else "", unit_of("position", slides)
+                return f"position of joint {k + 1} is {parts[0][k]:.4g} {unit}, beyond its limits{degrees}"
+            for what, x, most in zip(_PARTS[1:], parts[1:], (velocity, effort), strict=True):
                 for k in np.flatnonzero(np.abs(x) > most):
+                    unit = unit_of(what, self._slides[k])
                     return f"{what} of joint {k + 1} is {x[k]:.4g} {unit}, beyond anything it can do"
         return _IN_GENERAL.get(reason, reason)
 

@@ -90,5 +90,5 @@ def learned_from(
 def _is_empty(run: PosteriorLeastSquares) -> bool:
     stream, last = run.stream, run.last
     told = run.reference is None and stream.solutions > 0 and stream.difference is None
-    as_it_was = arm_changed(stream.drift, stream.another) is None
+    as_it_was = arm_changed(run.arm, stream.drift, stream.another) is None
     return told and as_it_was and stream.seconds >= LEARN_FROM and abs(last.phi[0]) <= HELD * last.std[0]

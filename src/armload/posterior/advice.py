@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.inertia import NAMES
 from armload.motion import Motion
 from armload.posterior.cramer_rao import Bound, bound, followed
@@ -35,7 +36,7 @@ _HELPS = 0.9  # of the half-widths that are not small enough: what counts as bet
 class Advice:
     """The joint that is worth moving more.
 
-    joint: its name; swing, frequency: how much it was moved more [rad, Hz].
+    joint: its name; swing, frequency: how much it was moved more [`unit`, Hz].
     missing: parameters that the motion leaves undetermined; gained: those of them that the swing determines.
     weakest: what the motion tells least about, in words: a combination of parameters, or several alike.
     share: its standard deviation over the one before the run.
@@ -44,6 +45,7 @@ class Advice:
 
     joint: str
     swing: float
+    unit: str
     frequency: float
     missing: tuple[str, ...]
     gained: tuple[str, ...]
@@ -59,7 +61,7 @@ class Advice:
         )
         return (
             f"least is known about {self.weakest} ({self.share:.0%} of the standard deviation is left); of the joints "
-            f"with room for it, {self.joint} is most worth moving more: ±{self.swing:.2g} rad at "
+            f"with room for it, {self.joint} is most worth moving more: ±{self.swing:.2g} {self.unit} at "
             f"{self.frequency:.2g} Hz on top {what}"
         )
 
@@ -95,6 +97,7 @@ def advise(arm: Arm, run: Recording | Motion, tare: Recording | Motion | None = 
     return Advice(
         joint=arm.joint_names[best[0]],
         swing=best[1],
+        unit=unit_of("position", arm.limits.slides[best[0]]),
         frequency=best[2],
         missing=tuple(names[missing].tolist()),
         gained=tuple(names[gained(after)].tolist()),

@@ -138,8 +138,8 @@ class Profile:
         flange = prefixed_frame(arm, self.frame)
         if arm.n != self.n or flange is None or _fingerprint(arm, flange) != self.fingerprint:
             raise ModelError(
-                f"the profile is of {self.arm_name}: {arm.name} is another arm, or has other links; learn one for it "
-                "with `armload profile`"
+                f"the profile is of {self.arm_name} to {self.frame}: {arm.name} to {arm.frame} is another arm, stands "
+                "elsewhere in its file, or has other links; learn one for it with `armload profile`"
             )
         if not np.allclose(arm.gravity, self.gravity, atol=0.05):
             raise ModelError(

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.arms.units import unit_of
 from armload.devices.mover import Movement, StreamedMover
 from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.source import Ros2Source
@@ -100,7 +101,10 @@ class Ros2Mover(StreamedMover):
             return None
         away = np.abs(self._goal - self._seen)
         j = int(np.argmax(away))
-        return None if away[j] < _SAME else f"{self.arm.joint_names[j]} is {away[j]:.3f} rad from its end ({self.see})"
+        unit = unit_of("position", self.arm.limits.slides[j])
+        return (
+            None if away[j] < _SAME else f"{self.arm.joint_names[j]} is {away[j]:.3f} {unit} from its end ({self.see})"
+        )
 
     def silence(self, seconds: float) -> str:
         """What to say where no sample came for so many seconds while the arm was on its way."""

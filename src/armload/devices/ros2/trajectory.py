@@ -149,10 +149,12 @@ def read_trajectory(
             None if column is None else np.vstack([here, column])
             for column, here in zip((positions, velocities, accelerations), start, strict=True)
         )
-    elif (away := float(np.max(np.abs(positions[0] - start[0])))) > _SAME_PLACE:
+    elif np.max(away := np.abs(positions[0] - start[0])) > _SAME_PLACE:
+        j = int(np.argmax(away))
+        unit = unit_of("position", arm.limits.slides[j])
         raise MotionError(
-            f"the trajectory begins at once, {away:.3f} rad from where the arm is: give its first point a "
-            "time_from_start that lets the arm get there"
+            f"the trajectory begins at once, {away[j]:.3f} {unit} from where {arm.joint_names[j]} is: give its first "
+            "point a time_from_start that lets the arm get there"
         )
     assert positions is not None
     motion = TrajectoryMotion(times, positions, velocities, accelerations, start[1])
