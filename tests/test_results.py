@@ -766,7 +766,8 @@ def test_what_profiles_gain_and_miss_is_what_was_measured():
     )
     others = {way: sum(cell[way]["others"] for cell in anywhere) for way in ("as it is", "first four")}
     assert (
-        f"{others['as it is']} of {3 * len(anywhere)} logs, for {others['first four']} of {3 * len(anywhere)}" in page
+        f"{others['as it is']} of {3 * len(anywhere)} logs, instead of {others['first four']} of {3 * len(anywhere)}"
+        in page
     )
     assert np.mean(np.array(inside) < 95.0) > 0.5
     same = result_of("life")["same day"]
