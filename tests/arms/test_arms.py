@@ -696,6 +696,7 @@ def side_by_side(tmp_path, *arms):
     [
         ((("panda", "", "left_"), ("panda", "", "right_")), ("left_panda_link8", "right_panda_link8")),
         ((("panda", "panda_", "panda_1_"), ("panda", "panda_", "panda_2_")), ("panda_1_link8", "panda_2_link8")),
+        ((("panda", "panda_", "fer_"), ("ur5e", "", "")), ("fer_link8", "tool0")),
         ((("ur5e", "", ""), ("ur10e", "", "right_")), ("tool0", "right_tool0")),
         ((("iiwa7", "", "left_"), ("panda", "", "")), ("left_lbr_link_ee", "panda_link8")),
     ],
