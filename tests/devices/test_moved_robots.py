@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 
 from armload.arms import arm
+from armload.devices.remote_mover import DetachedMover
+from armload.errors import SourceError
 from armload.excitation import Obstacle, Surroundings
 from armload.inertia import to_order
 from armload.motion import FourierMotion, save_motion
@@ -279,6 +281,32 @@ def test_a_robot_that_loses_its_power_ends_the_measurement_soon_with_a_sentence(
     assert f"what was recorded until then is in {log}" in err.splitlines()[-1]
     assert "Traceback" not in err
     assert read_recording(log, served.robot).duration > 0.3
+
+
+@pytest.mark.parametrize("serve", ["fr3", "panda", "ur"], indirect=True)
+@in_time
+def test_an_order_is_obeyed_with_the_next_samples_even_where_the_client_holds_the_interpreter(served):
+    seen, answered = [0], []
+    try:
+        with DetachedMover(served.spec, served.robot) as mover:
+
+            def count():
+                for _ in mover:
+                    seen[0] += 1
+
+            counter = threading.Thread(target=count)
+            counter.start()
+            for _ in range(10):
+                before = seen[0]
+                mover.commanded()
+                answered.append(seen[0] - before)
+                time.sleep(0.03)
+        counter.join()
+    except SourceError as error:
+        in_vain(str(error))
+        raise
+    assert seen[0] > 100
+    assert np.median(answered) < 20  # a thread of its own for orders: a hundred and more, up to a second each
 
 
 @in_time

@@ -8,6 +8,9 @@ follows), ready, ended, error, or what became of a command.
 
 A sample is recorded before it is handed on: the record has every sample that was used.
 
+Orders are looked for after each sample, by the thread that takes the samples: one of their own would wait for the
+interpreter, which a client that holds it gives away for microseconds only. An arm would begin, and stop, seconds late.
+
 Clients print of their own accord: what goes to the descriptors of standard output and standard error goes nowhere here,
 unless ARMLOAD_TRACEBACK=1. What Python has to say, such as where a bug is, goes to the starter's standard error.
 """
@@ -18,7 +21,6 @@ import contextlib
 import ctypes
 import json
 import os
-import queue
 import select
 import signal
 import sys
@@ -30,6 +32,7 @@ from typing import Any
 
 import numpy as np
 
+from armload.devices.detached import TO_REST
 from armload.devices.opening import open_source, prepare
 from armload.devices.order import arm_from_json, parameters_from_json, payloads_from_json
 from armload.devices.recorder import Recorder
@@ -48,6 +51,44 @@ _PATIENCE = 1.0  # [s] a source may take to end before the process does
 _PR_SET_PDEATHSIG = 1  # of prctl(2): the signal this process gets when the thread that started it ends
 
 
+class _Orders:
+    """JSON objects from a pipe, one a line.
+
+    Attributes:
+        ended: whether the other end is closed, and nothing will follow.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self.ended = False
+        self._descriptor, self._heard = descriptor, b""
+        self._poll = select.poll()
+        self._poll.register(descriptor, select.POLLIN)
+
+    def first(self) -> dict[str, Any] | None:
+        """Wait for one; None: there is none."""
+        while b"\n" not in self._heard:
+            if not (more := os.read(self._descriptor, 1 << 16)):
+                return None
+            self._heard += more
+        line, self._heard = self._heard.split(b"\n", 1)
+        return json.loads(line)
+
+    def waiting(self) -> Iterator[dict[str, Any]]:
+        """Those that have come, without waiting."""
+        while not self.ended and self._poll.poll(0):
+            more = os.read(self._descriptor, 1 << 16)
+            self.ended = not more
+            self._heard += more
+        *lines, self._heard = self._heard.split(b"\n")
+        yield from map(json.loads, lines)
+
+    def end(self) -> None:
+        """Wait until the other end is closed, whatever has not been read."""
+        closed = select.poll()
+        closed.register(self._descriptor, 0)
+        closed.poll()
+
+
 class _Reader:
     """One run of the process."""
 
@@ -55,7 +96,7 @@ class _Reader:
         self.ring = Ring(ring)
         self.wake = wake
         self.status = status
-        self.commands: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        self.orders = _Orders(sys.stdin.fileno())
         os.set_blocking(wake, False)
 
     def report(self, **event: Any) -> None:
@@ -63,10 +104,8 @@ class _Reader:
             os.write(self.status, (json.dumps(event) + "\n").encode())
 
     def run(self) -> None:
-        lines = _lines(sys.stdin.fileno())
-        if (line := next(lines, None)) is None:  # nobody needed it
+        if (order := self.orders.first()) is None:  # nobody needed it
             return
-        order = json.loads(line)
         arm, options = arm_from_json(order["arm"]), order["options"]
         if options.get("payloads"):
             options["payloads"] = payloads_from_json(options["payloads"])
@@ -82,7 +121,7 @@ class _Reader:
                 recorder = None
                 if record is not None:
                     recorder = stack.enter_context(Recorder(record, source.n, arm.joint_names))
-                threading.Thread(target=self.listen, args=(source, lines), daemon=True).start()
+                threading.Thread(target=self.watch, args=(source,), daemon=True).start()
                 about = {"name": source.name, "n": source.n, "rate": source.rate, "speed": source.speed}
                 self.report(event="ready", **about, notes=source.notes)
                 try:
@@ -114,8 +153,10 @@ class _Reader:
             self.ring.write(row)
             with contextlib.suppress(BlockingIOError, BrokenPipeError):  # nobody is waiting, or nobody is there
                 os.write(self.wake, b".")
-            while not self.commands.empty():
-                self.obey(source, self.commands.get())
+            for order in self.orders.waiting():
+                self.obey(source, order)
+            if self.orders.ended and not (isinstance(source, RemoteMover) and source.comes_to_rest()):
+                return
 
     def obey(self, source: Source, command: dict[str, Any]) -> None:
         method = command["call"]
@@ -132,12 +173,11 @@ class _Reader:
             sent = isinstance(error, SentError)
             self.report(event="refused", number=command["number"], message=str(error), sent=sent)
 
-    def listen(self, source: Source, lines: Iterator[bytes]) -> None:
-        """Take commands until standard input ends; then end the source, and if it does not, the process."""
-        for line in lines:
-            self.commands.put(json.loads(line))
-        if isinstance(source, RemoteMover):  # whoever started it has ended: the arm comes to rest first
-            source.come_to_rest()
+    def watch(self, source: Source) -> None:
+        """End the source once its starter has ended, should it wait for a sample, and the process if that does not."""
+        self.orders.end()
+        if isinstance(source, RemoteMover):  # the arm comes to rest first
+            source.over.wait(TO_REST)
         watch = threading.Timer(_PATIENCE, os._exit, [0])  # the record needs no closing
         watch.daemon = True
         watch.start()
@@ -179,16 +219,6 @@ def _silence_clients() -> None:
     with open(os.devnull, "wb") as nowhere:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
-
-
-def _lines(descriptor: int) -> Iterator[bytes]:
-    """Lines of a pipe as they come, without the locks of a buffered file, which a thread may hold when all ends."""
-    heard = b""
-    while more := os.read(descriptor, 1 << 16):
-        heard += more
-        while b"\n" in heard:
-            line, heard = heard.split(b"\n", 1)
-            yield line
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ outside.
 
 from __future__ import annotations
 
-import time
+import threading
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
-from armload.devices.detached import TO_REST, Detached, Refused
+from armload.devices.detached import Detached, Refused
 from armload.devices.load import Load
 from armload.devices.mover import Mover, check_start
 from armload.devices.source import Source
@@ -29,7 +29,6 @@ from armload.recording import Sample
 
 _TABLE = 250.0  # [Hz] of the points that a movement is handed over with: quintics between them are off by 1e-9 rad
 _COLUMNS = ("times", "positions", "velocities", "accelerations")
-_LOOK = 0.01  # [s] between two looks at whether the arm is at rest
 
 
 class RemoteMover(Source):
@@ -39,12 +38,13 @@ class RemoteMover(Source):
         mover: closed with this one.
 
     Attributes:
-        ended: how many movements have ended.
+        ended: how many movements have ended. over: set when no sample will follow.
     """
 
     def __init__(self, mover: Mover) -> None:
         self.mover, self.name, self.n, self.rate = mover, mover.name, mover.n, mover.rate
-        self.ended, self._begun, self._over = 0, 0, False
+        self.ended, self._begun, self._stopped = 0, 0, False
+        self.over = threading.Event()
 
     def __iter__(self) -> Iterator[Sample]:
         try:
@@ -52,7 +52,7 @@ class RemoteMover(Source):
                 self.ended = self._begun - self.mover.moving
                 yield sample
         finally:
-            self._over = True
+            self.over.set()
 
     def begin(self, motion: dict[str, Any], thresholds: dict[str, Any]) -> int:
         """`Mover.follow`; the movement's number."""
@@ -76,12 +76,12 @@ class RemoteMover(Source):
         found = Load(parameters, std=None if std is None else np.array(std), **load)
         return self.mover.write(found, allow_undetermined_inertia=allow_undetermined_inertia)
 
-    def come_to_rest(self) -> None:
-        """Stop, and wait until that is done; nothing is done any more where the samples have ended."""
-        self.mover.stop("whoever moved the arm has ended")
-        until = time.monotonic() + TO_REST
-        while self.mover.moving and not self._over and time.monotonic() < until:
-            time.sleep(_LOOK)
+    def comes_to_rest(self) -> bool:
+        """Stop, told once; whether the arm still moves."""
+        if not self._stopped:
+            self._stopped = True
+            self.mover.stop("whoever moved the arm has ended")
+        return self.mover.moving
 
     def arrived(self) -> float | None:
         """The mover's."""
