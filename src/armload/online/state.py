@@ -24,7 +24,7 @@ from armload.runtime.content import digest_of_numbers
 from armload.runtime.packing import Packer, Unpacker
 from armload.runtime.regular import check_regular
 
-FORMAT = 31
+FORMAT = 32
 
 
 def save_state(path: str | PathLike[str], state: dict[str, Any], arm: Arm, method: str, engine: Identifier) -> Path:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armload.posterior.accumulation import Accumulation
 from armload.posterior.another_arm import found_so_far
 from armload.posterior.checked_solver import CheckedSolver
+from armload.posterior.first_moments import FirstMoments
 from armload.posterior.joint_gains import spread
 from armload.posterior.same_motion import Difference, SameMotion
 from armload.posterior.scales import AnotherArm, Drift, Posterior, Scales, Tilt
@@ -26,7 +27,6 @@ from armload.recording import GAP
 from armload.regression import Correction, JointFeatures
 from armload.regression.information import RegressionData
 from armload.regression.lag import GAIN
-from armload.regression.noise import MOMENT, share_of_noise, whole_noise
 from armload.regression.pooling import Pooling, pooled
 from armload.regression.rows import REGRESSOR_RATE, FilteredRegression, Row
 
@@ -74,10 +74,8 @@ class StreamingPosterior:
         self._gaussian = mean, np.ascontiguousarray(root), np.ascontiguousarray(root.T)
         self.tares, self.gain, self.start = tuple(tares), gain, start
         self._regression = self.regression()
-        self._whole = whole_noise(correction, self.noise)
-        self._base: SequentialPosterior | None = None  # in the first moments: before any row
-        self._first: Posterior | None = None
-        self._accumulation = Accumulation(self._empty(), same_motion)
+        self._first = FirstMoments(solver, correction, features, gain, self.tares, start)
+        self._accumulation = Accumulation(self._first.no_rows(), same_motion)
         self._pooling, self._looked = Pooling(together), Pooling(together)
         self.reset()
 
@@ -88,13 +86,13 @@ class StreamingPosterior:
 
     def reset(self) -> None:
         """Forget the run (not the tare); the next sample is the first."""
-        self._accumulation.reset(self._empty())
+        self._accumulation.reset(self._first.no_rows())
         self._regression.reset()
         self._pooling.reset()
         self._looked.reset()
-        self._state: SequentialPosterior | None = None  # made when the first row asks for it
-        self._early: list[Row] | None = []
-        self._early_is_old = True
+        self._first.reset()
+        self._early = True  # in the first moments
+        self._state: SequentialPosterior | None = None  # made when it is asked for, meanwhile
         self.rows, self.seconds, self.solutions = 0, 0.0, 0
         self.row: Row | None = None
         self.difference: Difference | None = None
@@ -107,36 +105,20 @@ class StreamingPosterior:
 
     def prepare(self) -> None:
         """Do now what the first answer would have to wait for: the posterior of the tares alone."""
-        if self._early is not None:
-            self._begun()
-
-    def _begun(self) -> SequentialPosterior:
-        """The state before any row; made again where it has been left, as the tares are what they were."""
-        if self._base is None:
-            first = self._solver.solve([*self.tares, self._empty()], self.start, 1)
-            self._first, self._base = first.posterior, first.state
-            self._whole = first.posterior.scales.noise[-1] / share_of_noise(0.0)  # as the tares show it
-            self._base.noise = self._whole
-        return self._base
+        if self._early:
+            self._first.begun()
 
     @property
     def posterior(self) -> Posterior:
         """The last full solution: of the tares alone before there was one."""
-        return self._of_tares if self._posterior is None else self._posterior
-
-    @property
-    def _of_tares(self) -> Posterior:
-        if self._first is None:
-            self._begun()
-        assert self._first is not None
-        return self._first
+        return self._first.of_tares if self._posterior is None else self._posterior
 
     def allow_for_sticking(self, variance: NDArray[np.float64]) -> None:
         """Joints at rest are held by friction of this variance (n,) [N²·m²]: the next rows weigh less while they are.
 
         Of a block of rows, in units of the noise expected of one: never less than is expected of any arm.
         """
-        noise = self._of_tares.scales.noise[-1] / self.noise.block
+        noise = self._first.of_tares.scales.noise[-1] / self.noise.block
         self._regression.presliding[:] = np.maximum(self.correction.presliding, variance / noise)
         self._allows = None
 
@@ -152,9 +134,6 @@ class StreamingPosterior:
         """By how much the variance (n,) of a joint's residual is larger at rest, as the rows have it."""
         return self._regression.presliding
 
-    def _empty(self) -> RegressionData:
-        return RegressionData(self.correction, self.gain, self.features, self.noise.block, self._solver.session)
-
     def take(self, t: float, q: NDArray, dq: NDArray, tau: NDArray) -> bool:
         """Take one sample (n,); times rise. True if it completed rows that count now, that is, if something is new."""
         self.prepare()
@@ -166,15 +145,13 @@ class StreamingPosterior:
         self.rows += len(rows)
         self.row = row = pooled(rows)
         self.seconds += row.h
-        if self._early is not None:
-            self._early.append(row)
-            self._early_is_old = True
-            if self.seconds >= MOMENT:
-                self._from_early()
-                self._early = self._base = None
+        if self._early:
+            self._early = self._first.take(row, self.seconds)
+            self._state = None if self._early else self._first.state(self.seconds)
+            if not self._early:
+                self._first.leave()
         else:
-            assert self._state is not None
-            self._state.take(row)
+            self._current.take(row)
         result = self._accumulation.take(rows, row, self.rows, self.posterior.covariance, self._step)
         if result is not None:
             solution, self.difference = result
@@ -209,7 +186,7 @@ class StreamingPosterior:
     @property
     def state(self) -> SequentialPosterior | None:
         """The posterior's state after the last row, with what that row said; None in the first moments."""
-        return None if self._early is not None else self._state
+        return None if self._early else self._state
 
     @property
     def stands(self) -> bool:
@@ -240,20 +217,9 @@ class StreamingPosterior:
 
     @property
     def _current(self) -> SequentialPosterior:
-        self.prepare()
-        self._from_early()
-        assert self._state is not None
+        if self._state is None:
+            self._state = self._first.state(self.seconds)
         return self._state
-
-    def _from_early(self) -> None:
-        """The state of a run so short that the residual shows one value: with less noise the shorter it is."""
-        if self._early is None or not self._early_is_old:
-            return
-        self._state = self._begun().copy()
-        self._state.noise = self._whole * share_of_noise(self.seconds)
-        for row in self._early:
-            self._state.take(row)
-        self._early_is_old = False
 
     def conclude(self) -> None:
         """A last solution from all rows so far, as no more will come; it begins with the scales found from the tare."""
@@ -269,7 +235,7 @@ class StreamingPosterior:
         return self._solver.go_on([*self.tares, run], self.posterior.scales if self.solutions else self.start)
 
     def _adopt(self, solution: Solution) -> None:
-        self._early, self.without_tare = None, False
+        self._early, self.without_tare = False, False
         if solution.finite:  # else the last one goes on
             self._posterior, self._state = solution.posterior, solution.state
             self.solutions += 1
@@ -278,7 +244,7 @@ class StreamingPosterior:
             self.another = found_so_far(self.another, solution.another)
             self.restlessness, self.without_tare = solution.restlessness, solution.without_tare
         elif self._state is None:
-            self._state = self._begun().copy()
+            self._state = self._first.state(self.seconds)
 
     def _take_waiting(self) -> None:
         """Accumulate rows that wait for others, as none will come soon: the next solution knows them."""
