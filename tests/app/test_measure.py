@@ -173,6 +173,12 @@ def test_without_a_motion_one_about_the_present_pose_is_designed(tmp_path, monke
         (["--motion", "MOTION", "--move", "--grip", "close 'it"], "is no command: no closing quotation"),
         (["--motion", "MOTION", "--move", "--grip", ""], "is no command: expected a program"),
         (["--motion", "MOTION", "--move", "--at", "0,0,0,-2,0,2,0", "--approach", "0.1"], "more than the 0.1 rad"),
+        (
+            ["--motion", "MOTION", "--at", "1e300,0,0,-2,0,2,0"],
+            "panda_joint1 at 1e+300 rad: expected -2.8973",
+        ),
+        (["--motion", "MOTION", "--move", "--dir", "logs", "--out", "logs"], "is written by another option, too"),
+        (["--motion", "MOTION", "--move", "--dir", ".", "--out", "loaded.csv"], "measurement's own loaded.csv"),
     ],
 )
 def test_what_cannot_be_is_one_sentence_and_nothing_is_made(arguments, said, motion, tmp_path, monkeypatch, capsys):

@@ -266,6 +266,36 @@ def test_an_arm_whose_log_cannot_grow_is_stopped_and_what_was_kept_can_be_read(p
     assert len(read_recording(tmp_path / "loaded.csv", panda)) == 99
 
 
+class Overrun(SimulatedMover):
+    """Whoever takes its samples was too slow for 40 of them on the way with the payload."""
+
+    def __init__(self, *arguments, **settings):
+        super().__init__(*arguments, **settings)
+        self.lost, self.movements, self.samples = 0, 0, self._samples
+        self._samples = self.overrun()
+
+    def follow(self, motion, thresholds=None):
+        super().follow(motion, thresholds)
+        self.movements, self.count = self.movements + 1, 0
+
+    def overrun(self):
+        for sample in self.samples:
+            self.count = self.count + 1 if self.movements == 2 else 0
+            if 100 < self.count <= 140:
+                self.lost += 1
+            else:
+                yield sample
+
+
+def test_samples_that_a_log_lacks_are_said(panda, simulated, tmp_path):
+    mover, orders, said = simulated(kind=Overrun, rate=1000.0), Orders(), []
+    procedure = Procedure(mover, panda, MOTION, tmp_path, basis=BY_MAP, say=said.append)
+    procedure.run(orders.consent, orders.mount(mover))
+    lacks = [line for line in said if "lacks" in line]
+    assert len(lacks) == 1
+    assert f"this process did not run for a while: {tmp_path / 'loaded.csv'} lacks 40 samples" in lacks[0]
+
+
 class Broken(SimulatedMover):
     """Its samples end on the way with the payload, or from there on all have one time."""
 

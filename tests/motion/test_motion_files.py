@@ -18,6 +18,7 @@ from armload.motion import (
     random_motion,
     taie2024,
 )
+from armload.motion.motion_file import save_motions
 from armload.recording import Recording
 
 
@@ -209,3 +210,15 @@ def test_the_fingerprint_tells_motions_apart_and_ignores_their_names():
     assert MotionFingerprint.of(taie2024().scaled(0.999)) != mark
     slower = FourierMotion(taie2024().offset, taie2024().sine, taie2024().cosine, 6.001)
     assert MotionFingerprint.of(slower) != mark
+
+
+def test_motions_that_belong_together_are_written_all_of_them_or_none(tmp_path, ur_motion):
+    pair = tmp_path / "m.json", tmp_path / "m-empty.json"
+    save_motions([(path, taie2024()) for path in pair])
+    before = [path.read_bytes() for path in pair]
+    with pytest.raises(MotionError, match=r"missing/m-empty\.json cannot be written: No such file"):
+        save_motions([(pair[0], ur_motion), (tmp_path / "missing" / "m-empty.json", ur_motion)])
+    assert [path.read_bytes() for path in pair] == before
+    save_motions([(path, ur_motion) for path in pair])
+    assert [load_motion(path).name for path in pair] == [ur_motion.name] * 2
+    assert sorted(tmp_path.iterdir()) == sorted(pair)

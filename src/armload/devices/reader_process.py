@@ -60,7 +60,7 @@ class _Orders:
 
     def __init__(self, descriptor: int) -> None:
         self.ended = False
-        self._descriptor, self._heard = descriptor, b""
+        self._descriptor, self._heard = descriptor, bytearray()
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
 
@@ -79,8 +79,9 @@ class _Orders:
             more = os.read(self._descriptor, 1 << 16)
             self.ended = not more
             self._heard += more
-        *lines, self._heard = self._heard.split(b"\n")
-        yield from map(json.loads, lines)
+            if b"\n" in more:  # what has come of a long one is not copied at each look
+                *lines, self._heard = self._heard.split(b"\n")
+                yield from map(json.loads, lines)
 
     def end(self) -> None:
         """Wait until the other end is closed, whatever has not been read."""

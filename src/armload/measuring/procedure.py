@@ -29,6 +29,7 @@ from armload.posterior import Known
 from armload.recording import Recording, Sample, read_recording
 from armload.runtime.interruption import held_back
 
+LOGS = ("empty.csv", "loaded.csv")
 ENOUGH = "the accuracy asked for is reached"
 _LOOK = 0.02  # [s] between two looks at the accuracy: a tenth of a braking time
 _STILL = 0.2  # [s] for which the arm must have stood before a movement: what was just put on has swung out
@@ -98,8 +99,7 @@ class Procedure:
         self.folder, self.basis, self.room = Path(folder), basis or Basis(), room or Room()
         self._known = self.basis.known(arm)
         self.accuracy, self.thresholds, self._say = accuracy, thresholds or Thresholds(), say
-        names = ("empty.csv", "loaded.csv") if self.basis.tare is None else ("loaded.csv",)
-        for path in (self.folder / name for name in names):
+        for path in (self.folder / name for name in LOGS[self.basis.tare is not None :]):
             if path.exists():
                 raise RecordingError(f"{path} exists: a log is never written over; name another folder")
         at = self._standing(_TO_SWING_OUT)
@@ -125,7 +125,7 @@ class Procedure:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RecordingError(f"{self.folder} cannot be made: {error.strerror}") from None
-        empty, loaded = self.folder / "empty.csv", self.folder / "loaded.csv"
+        empty, loaded = (self.folder / name for name in LOGS)
         tare = self.basis.tare
         if tare is None:
             self._move(self.plan, TO_START)
@@ -243,6 +243,7 @@ class Procedure:
         first, last, looked = np.inf, -np.inf, -np.inf
         recorder = None if log is None else Recorder(log, self.mover.n)
         unkept: RecordingError | None = None
+        lost = int(getattr(self.mover, "lost", 0))
         try:
             with held_back() as interruption:
                 for sample in samples_of_movement(self.mover, leg.motion, self.thresholds):
@@ -277,6 +278,10 @@ class Procedure:
             raise RecordingError(
                 f"the clock of {self.mover.name} went back on the way {purpose}, and the log is in parts "
                 f"({', '.join(map(str, recorder.paths))}): see what sets that clock, and measure into another folder"
+            )
+        if log is not None and (missed := int(getattr(self.mover, "lost", 0)) - lost):
+            self._say(
+                f"this process did not run for a while: {log} lacks {missed} samples, and the answer rests on the rest"
             )
         return last - first
 

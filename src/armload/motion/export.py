@@ -56,7 +56,7 @@ def export_motion(
         MotionError: an unknown format, a rate that is not positive or too low for the motion, a lead below 0, joint
             names missing, a "ur" motion that has not 6 joints, or a file that cannot be written.
     """
-    write_whole(path, motion_text(motion, format, rate, joint_names, lead))
+    write_whole([(path, motion_text(motion, format, rate, joint_names, lead))])
 
 
 def motion_text(

@@ -7,7 +7,8 @@ of a `SplineMotion`, one of the kind "path" the points of a `PathMotion`.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,7 +72,19 @@ def save_motion(path: str | Path, motion: Motion) -> None:
     Raises:
         MotionError: the motion has no coefficients to save, or the file cannot be written.
     """
-    write_whole(path, motion_to_json(motion))
+    save_motions([(path, motion)])
+
+
+def save_motions(motions: Iterable[tuple[str | Path, Motion]]) -> None:
+    """Write motions that belong together, as of `save_motion`: the first takes its place when all are written.
+
+    Args:
+        motions: each with its file.
+
+    Raises:
+        MotionError: as of `save_motion`; then all files are as they were.
+    """
+    write_whole([(path, motion_to_json(motion)) for path, motion in motions])
 
 
 def motion_to_json(motion: Motion) -> str:
@@ -107,13 +120,15 @@ def motion_to_json(motion: Motion) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def write_whole(path: str | Path, text: str) -> None:
-    """Write a text file, complete or not at all; MotionError if it cannot be written."""
+def write_whole(texts: Iterable[tuple[str | Path, str]]) -> None:
+    """Write text files, complete and all of them, or none; MotionError if one cannot be written."""
     try:
-        with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+        with ExitStack() as stack:
+            for path, text in texts:
+                temporary = stack.enter_context(replacing(path))
+                temporary.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
-        raise MotionError(f"{path} cannot be written: {error.strerror}") from None
+        raise MotionError(f"{error.filename} cannot be written: {error.strerror}") from None
 
 
 def _content(text: str, where: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import subprocess
 import sys
@@ -62,6 +63,8 @@ def run(options: argparse.Namespace) -> int | None:
     check_tare_age(options)
     _, tare = read_logs(options, arm, None, options.tare)
     folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
+    if options.out is not None and (log := _log_called(options.out, folder)):
+        raise UsageError(f"--out {options.out} would replace the measurement's own {log}: name another file")
     heaviest = Basis(**known).heaviest
     simulated = {} if options.source != "sim" else _simulated(options, arm, motion, heaviest, loaded=tare is not None)
     with open_mover(options.source, arm, **simulated) as mover:
@@ -122,6 +125,13 @@ def _check_idle(options: argparse.Namespace) -> None:
         refuse_idle(given(options, *COLUMN_OPTIONS), "of the log of --tare, which is not given")
     else:
         refuse_idle(given(options, "grip"), "of mounting the payload, and with --tare it is on already")
+
+
+def _log_called(out: str, folder: str) -> str | None:
+    """Which of the measurement's own logs has the name of the answer's file; None: neither."""
+    from armload.measuring.procedure import LOGS
+
+    return next((log for log in LOGS if os.path.realpath(os.path.join(folder, log)) == os.path.realpath(out)), None)
 
 
 def _tool(options: argparse.Namespace, arm: Arm) -> InertialParameters:
@@ -257,7 +267,9 @@ def _simulated(
     payload, at = payload_of(options.payload, arm), options.at
     if at is None and motion is not None:
         at = motion.position([0.0])[0]
-    elif at is None:
+    if at is not None:
+        _check_stands(arm, at)
+    else:
         at = pose_to_begin_at(arm, lambda pose: _allowed(arm, pose, mass, options), options.floor)
     return {
         "at": at,
@@ -267,3 +279,20 @@ def _simulated(
         "speed": options.speed,
         "seed": options.seed,
     }
+
+
+def _check_stands(arm: Arm, at: Any) -> None:
+    """See that a simulated arm can be where it is to stand.
+
+    Raises:
+        UsageError: a joint is beyond its range.
+    """
+    from armload.arms.units import unit_of
+
+    ranges = zip(arm.joint_names, at, arm.limits.position_low, arm.limits.position_high, arm.limits.slides, strict=True)
+    for joint, q, low, high, slides in ranges:
+        if not low <= q <= high:
+            raise UsageError(
+                f"the simulated arm cannot stand with {joint} at {q:g} {unit_of('position', slides)}: expected {low:g} "
+                f"to {high:g}; see --at, or where the motion begins"
+            )

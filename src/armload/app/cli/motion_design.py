@@ -77,7 +77,7 @@ def criterion_of(options: argparse.Namespace, arm: Arm, own_tare: bool = False) 
 def run_design(options: argparse.Namespace) -> int:
     """Design, write, and say what was found."""
     from armload.excitation import Accuracy, design_motion, design_until
-    from armload.motion import save_motion
+    from armload.motion.motion_file import save_motions
 
     if options.until is not None and options.time is not None:
         raise UsageError("--time and --until exclude each other: give one of them")
@@ -95,13 +95,10 @@ def run_design(options: argparse.Namespace) -> int:
             found = design_motion(constraints, criterion, 3.0 if options.time is None else options.time, **settings)
         else:
             found = design_until(constraints, criterion, Accuracy.read(options.until), **settings)
-    save_motion(out, found.motion)
-    written = [str(out)]
-    if found.empty is not None:
-        written.append(str(empty))
-        save_motion(written[1], found.empty)
+    written = {str(out): found.motion} | ({} if found.empty is None else {str(empty): found.empty})
+    save_motions(written.items())
     if options.json:
-        print_json(_fields(found, constraints, criterion, written, words))
+        print_json(_fields(found, constraints, criterion, list(written), words))
         return 0
     _print(found, constraints, criterion, words)
     print_note(f"wrote {' and '.join(written)}; run it slowly first")

@@ -48,8 +48,9 @@ def check_outputs(options: argparse.Namespace, *more: tuple[str, OutputFile]) ->
     """
     given = [(_option(key), value) for key, value in vars(options).items() if isinstance(value, OutputFile)]
     outputs, inputs = [*given, *more], None
+    folders = [value for value in vars(options).values() if isinstance(value, OutputFolder)]
     for k, (option, out) in enumerate(outputs):
-        if any(_same(out, other) for _, other in outputs[:k]):
+        if any(_same(out, other) for other in (*folders, *(other for _, other in outputs[:k]))):
             raise UsageError(f"{option} {out} is written by another option, too: name another file")
         if os.path.exists(out) and not _is_stream(out):
             inputs = list(_inputs(options)) if inputs is None else inputs
