@@ -1,30 +1,39 @@
-"""How orders come to the process that moves an arm."""
+"""Orders to a reader, as they come through a pipe."""
 
 import json
 import os
-import time
+
+import pytest
 
 from armload.devices.reader_process import _Orders
 
-PIECE = 8192  # bytes that have come at a look
 
-
-def test_a_long_order_is_heard_without_copying_it_at_each_look():
+@pytest.mark.parametrize("piece", [1, 7, 1000])
+def test_orders_are_heard_whole_and_in_their_order_in_whatever_pieces_they_come(piece):
     theirs, ours = os.pipe()
     orders = _Orders(theirs)
-    content = {"call": "begin", "arguments": [[0.1234567890123] * 1_500_000]}  # some minutes of motion, 25 MB
-    text = (json.dumps(content) + '\n{"call": "stop"}\n').encode()
-    begun = time.thread_time()
-    json.loads(text.split(b"\n")[0])
-    once = time.thread_time() - begun
-    begun, heard = time.thread_time(), []
-    for k in range(0, len(text), PIECE):
-        os.write(ours, text[k : k + PIECE])
+    sent = [{"call": "begin", "arguments": [[0.1234567890123] * 300]}, {"call": "stop"}, {"call": "whereabouts"}]
+    text = "".join(json.dumps(each) + "\n" for each in sent).encode()
+    heard = []
+    for k in range(0, len(text), piece):
+        os.write(ours, text[k : k + piece])
         heard += orders.waiting()
-    taken = time.thread_time() - begun
+    assert not orders.ended
+    assert list(orders.waiting()) == []
     os.close(ours)
     assert list(orders.waiting()) == []
     assert orders.ended
     os.close(theirs)
-    assert heard == [content, {"call": "stop"}]
-    assert taken < 3.0 * once + 1.0  # all that had come, copied at each of 3000 looks: many seconds
+    assert heard == sent
+
+
+def test_what_comes_with_the_first_order_is_heard_after_it():
+    theirs, ours = os.pipe()
+    orders = _Orders(theirs)
+    os.write(ours, b'{"spec": "sim"}\n{"call": "stop"}\n{"call": ')
+    assert orders.first() == {"spec": "sim"}
+    assert list(orders.waiting()) == [{"call": "stop"}]
+    os.write(ours, b'"hold"}\n')
+    assert list(orders.waiting()) == [{"call": "hold"}]
+    for end in (theirs, ours):
+        os.close(end)

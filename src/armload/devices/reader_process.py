@@ -26,6 +26,7 @@ import signal
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
@@ -61,27 +62,32 @@ class _Orders:
     def __init__(self, descriptor: int) -> None:
         self.ended = False
         self._descriptor, self._heard = descriptor, bytearray()
+        self._lines: deque[bytearray] = deque()
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
 
     def first(self) -> dict[str, Any] | None:
         """Wait for one; None: there is none."""
-        while b"\n" not in self._heard:
-            if not (more := os.read(self._descriptor, 1 << 16)):
+        while not self._lines:
+            if self.ended:
                 return None
-            self._heard += more
-        line, self._heard = self._heard.split(b"\n", 1)
-        return json.loads(line)
+            self._read()
+        return json.loads(self._lines.popleft())
 
     def waiting(self) -> Iterator[dict[str, Any]]:
         """Those that have come, without waiting."""
         while not self.ended and self._poll.poll(0):
-            more = os.read(self._descriptor, 1 << 16)
-            self.ended = not more
-            self._heard += more
-            if b"\n" in more:  # what has come of a long one is not copied at each look
-                *lines, self._heard = self._heard.split(b"\n")
-                yield from map(json.loads, lines)
+            self._read()
+        while self._lines:
+            yield json.loads(self._lines.popleft())
+
+    def _read(self) -> None:
+        more = os.read(self._descriptor, 1 << 16)
+        self.ended = not more
+        self._heard += more
+        if b"\n" in more:  # what has come of a long one is not copied at each look
+            *lines, self._heard = self._heard.split(b"\n")
+            self._lines += lines
 
     def end(self) -> None:
         """Wait until the other end is closed, whatever has not been read."""
