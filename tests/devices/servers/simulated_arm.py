@@ -68,8 +68,9 @@ class SimulatedArm:
             self.target = self.target + self.speed * self.cycle
         forward = self.robot.torque(self.target)
         control = forward + self.gains.stiffness * self.target + self.gains.damping * self.speed
+        self.data.ctrl[:] = control
         for _ in range(round(self.cycle / STEP)):
-            self.data.ctrl[:] = control
-            mujoco.mj_step(self.model, self.data)
-        q, dq = self.data.qpos.copy(), self.data.qvel.copy()
-        return q, dq, control - self.gains.stiffness * q - self.gains.damping * dq
+            before = self.data.qpos.copy()
+            mujoco.mj_step(self.model, self.data)  # its springs act where the step begins, its damping where it ends
+        dq = self.data.qvel.copy()
+        return self.data.qpos.copy(), dq, control - self.gains.stiffness * before - self.gains.damping * dq
