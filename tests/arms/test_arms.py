@@ -29,7 +29,7 @@ from armload.arms.strength import poses
 from armload.devices.guard import flange_of
 from armload.errors import ArmError, ArmloadError, InertiaError, PayloadError
 from armload.inertia import InertialParameters, is_consistent, to_order
-from armload.payloads import franka_hand, hand_on
+from armload.payloads import franka_hand, hand_on, read_payload
 from armload.posterior import HybridModel
 from armload.regression import FilteredRegression, first_order_lag
 
@@ -940,6 +940,19 @@ def test_errors_are_one_sentence(attempt, says):
         attempt()
     assert isinstance(caught.value, ArmloadError)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("read", "kind"), [(arm, ArmError), (read_payload, PayloadError)])
+def test_a_file_that_may_not_be_read_is_named_once(tmp_path, monkeypatch, read, kind):
+    path = tmp_path / "x.urdf"
+    path.write_text("kept for others")
+
+    def denied(*_, **__):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(type(path), "read_text", denied)
+    with pytest.raises(kind, match=r"^(robot description|payload file) \S*x\.urdf cannot be read: Permission denied$"):
+        read(path)
 
 
 def test_a_file_that_is_no_description_is_an_arm_error(tmp_path):

@@ -585,6 +585,18 @@ def test_closing_a_reader_that_hangs_ends_an_iteration_without_an_error(panda, p
     assert gone(source.process)
 
 
+def test_whoever_closes_a_source_that_is_being_closed_waits_until_its_reader_has_ended(panda, path, monkeypatch):
+    """Else its process may end first, and a reader that hangs would keep the robot's connection for ever."""
+    monkeypatch.setattr("armload.devices.detached._TO_END", 1.0)
+    source = Detached(str(path), panda, loop=True)
+    os.kill(source.process.pid, signal.SIGSTOP)
+    threading.Thread(target=source.close, daemon=True).start()
+    while not source.process.stdin.closed:
+        time.sleep(0.01)
+    source.close()
+    assert gone(source.process)
+
+
 def test_a_late_answer_is_not_taken_for_that_of_the_next_call(panda, path, monkeypatch):
     """Else a robot that refused a load could seem to have taken it."""
     with Detached(str(path), panda, loop=True) as source:

@@ -255,6 +255,18 @@ def test_what_is_no_regular_file_is_no_profile_and_nobody_waits_for_it(kind, tmp
     )
 
 
+def test_a_profile_that_may_not_be_read_is_not_called_missing(tmp_path, monkeypatch):
+    path = tmp_path / "arm.profile"
+    path.write_bytes(b"kept for others")
+
+    def denied(*_):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(type(path), "open", denied)
+    with pytest.raises(ModelError, match=r"the profile .*arm\.profile cannot be read: Permission denied; let whoever"):
+        load_profile(path)
+
+
 @pytest.mark.parametrize("where", [0.3, 0.6, 0.95])
 def test_a_file_of_which_a_byte_is_another_is_refused(young, tmp_path, where):
     path = save_profile(young, tmp_path / "arm.profile")

@@ -156,7 +156,7 @@ def test_alarms_arrive_in_order_though_the_receiver_fails_first(receiver):
     assert taken == [({"number": k}, "Bearer x") for k in range(3)]
 
 
-def test_a_message_that_will_never_be_taken_holds_up_no_other(receiver):
+def test_a_message_that_will_never_be_taken_holds_up_no_other_and_is_said_to_be_dropped(receiver, caplog):
     url, taken, codes = receiver
     codes[:] = [400]
     webhook = Webhook(url)
@@ -166,6 +166,8 @@ def test_a_message_that_will_never_be_taken_holds_up_no_other(receiver):
     webhook.close()
     assert [message["number"] for message, _ in taken] == [1]
     assert (webhook.sent, webhook.dropped) == (1, 1)
+    dropped = "the webhook answered 400: what it answers so is dropped"
+    assert caplog.messages == [dropped, "the webhook takes alarms again; 1 was dropped"]
 
 
 @pytest.mark.parametrize("code", [301, 302, 303, 307, 308])
@@ -232,12 +234,16 @@ def test_a_receiver_that_answers_byte_by_byte_without_an_end_is_asked_again(monk
     assert "did not answer: timed out" in caplog.text
 
 
-def test_what_waits_for_a_dead_receiver_is_bounded():
+def test_what_waits_for_a_dead_receiver_is_bounded_and_what_is_dropped_is_said(caplog):
     webhook = Webhook("http://127.0.0.1:9/nobody")
     for k in range(3000):
         webhook.post({"number": k})
     assert webhook.dropped >= 1990
     webhook.close()
+    said = "the webhook does not get all alarms: 1000 wait, the oldest are dropped"
+    assert caplog.messages.count(said) == 1
+    webhook.health.tell(None)
+    assert caplog.messages[-1] == f"the webhook takes alarms again; {webhook.dropped} were dropped"
 
 
 def test_an_address_that_is_none_is_refused():

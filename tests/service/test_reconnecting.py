@@ -135,7 +135,7 @@ def test_a_reason_that_stays_is_said_as_often_as_the_wait_grows_and_then_now_and
             break
     assert len(said) == 3  # 1, 2 and 4 ms
     assert all("none.csv" in text for text in said)
-    monkeypatch.setattr("armload.service.reconnecting.REMINDED", 0.0)
+    monkeypatch.setattr("armload.service.backoff.REMINDED", 0.0)
     for _ in source.ticking(0.001):
         if len(trials) == 13:
             break

@@ -301,6 +301,19 @@ def test_kill_9_of_every_process_in_turn_is_survived(serve, cell):
 
 
 @pytest.mark.full
+def test_a_reader_that_hangs_outlives_no_service(serve, cell):
+    running = serve(cell("light"))
+    running.until(known("light"))
+    below = children(running.process.pid)
+    (reader,) = [p for p in below if b"reader_process" in Path(f"/proc/{p}/cmdline").read_bytes()]
+    running.stopped.append(reader)
+    os.kill(reader, signal.SIGSTOP)
+    running.process.terminate()
+    assert running.process.wait(60.0) == 0
+    assert remaining(below, 1.0) == []
+
+
+@pytest.mark.full
 def test_a_process_that_hangs_is_replaced(serve, cell):
     running = serve(cell("light"))
     running.until(known("light"))

@@ -207,6 +207,19 @@ def test_a_state_belongs_to_the_folder_of_its_tare_as_it_was(tmp_path):
     assert settings.state not in (first, second)
 
 
+def test_a_file_that_may_not_be_read_is_named_with_its_setting(tmp_path, monkeypatch):
+    path = tmp_path / "arm.profile"
+    path.write_text("kept for others")
+
+    def denied(*_):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(type(path), "open", denied)
+    settings = ArmSettings("panda", name="left", source="sim", save=str(tmp_path), profile=str(path))
+    with pytest.raises(UsageError, match=r"^profile: .*arm\.profile cannot be read: Permission denied$"):
+        _ = settings.state
+
+
 def test_a_service_without_arms_is_refused():
     with pytest.raises(UsageError, match="no arm"):
         ServiceSettings(())

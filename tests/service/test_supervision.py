@@ -9,6 +9,7 @@ from itertools import pairwise
 import pytest
 
 from armload.service import ArmSettings, Service, ServiceSettings, service, spare
+from armload.service.backoff import Backoff
 
 PATIENCE = 30.0  # [s]
 LINE = """json.dumps({"t": 1.0, "told": time.monotonic(), "known": True, "unknown": None, "why": None, "mass": 0.0,
@@ -75,6 +76,16 @@ def test_what_an_arm_cannot_begin_with_ends_the_service_at_first_and_is_tried_ag
     until(lambda: len(starts) >= 4)
     assert again.error is None
     assert "there is no tare" in again.answer("left")["why"]
+
+
+def test_what_keeps_an_arm_from_starting_again_is_said_once_as_long_as_it_stays_the_same(running, noted, monkeypatch):
+    monkeypatch.setattr(service, "Backoff", lambda: Backoff(0.01, 0.01))
+    one, starts = running('print(json.dumps({"error": "there is no tare"}), flush=True)', fails=(1,))
+    until(lambda: len(starts) >= 6)
+    assert [note for note in noted if "no tare" in note] == [
+        "left: its process cannot begin: there is no tare; it is started again in 0.0 s"
+    ]
+    assert "there is no tare" in one.answer("left")["why"]
 
 
 @pytest.mark.full  # some seconds

@@ -54,7 +54,9 @@ def arm(robot: str | Path, frame: str | None = None, gravity: tuple[float, float
         )
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise ArmError(f"robot description {name} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
         raise ArmError(f"robot description {name} cannot be read as text: {error}") from None
     try:
         found = _as_known(Arm(path.stem, text, frame, gravity))

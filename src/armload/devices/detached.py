@@ -93,7 +93,7 @@ class Detached(Source):
                 "process (detached=False)"
             )
         self.name = spec
-        self._closed = False
+        self._closed, self._closing = False, threading.RLock()  # held until its reader has ended
         self._twin = twin
         self._waiting = threading.Lock()  # held while the ring and the pipes are in use
         columns = columns_of(arm.n, self._moves)
@@ -219,13 +219,14 @@ class Detached(Source):
         return None if self._twin is None else self._twin.truth(t)
 
     def close(self) -> None:
-        """End the reader's process and let go of the memory."""
-        if self._closed:
-            return
-        self._closed = True
-        self._spawned.end(_TO_END + self._moves * TO_REST)
-        with self._waiting:  # whoever waited for a sample has seen the pipe end
-            self._spawned.release()
+        """End the reader's process and let go of the memory; whoever closes it meanwhile waits for that, too."""
+        with self._closing:
+            if self._closed:
+                return
+            self._closed = True
+            self._spawned.end(_TO_END + self._moves * TO_REST)
+            with self._waiting:  # whoever waited for a sample has seen the pipe end
+                self._spawned.release()
 
     def _raise_error_of_end(self) -> None:
         """Read events up to the last; SourceError if that is an error."""

@@ -101,12 +101,18 @@ class TensorFile:
 
         try:
             check_regular(path)  # the library waits for a pipe's writer, and no signal ends it
+            with path.open("rb"):  # the library calls what it may not read missing
+                pass
             with safe_open(path, framework="np") as file:
                 text = (file.metadata() or {}).get(self.header)
                 tensors = {key: np.ascontiguousarray(file.get_tensor(key)) for key in file.keys()}  # noqa: SIM118
             header = None if text is None else json.loads(text)
         except FileNotFoundError:
             raise ModelError(f"no {self.what} at {path}: {self.make} one with `{self.command}`") from None
+        except PermissionError as error:
+            raise ModelError(
+                f"the {self.what} {path} cannot be read: {error.strerror}; let whoever runs armload read it"
+            ) from None
         except (SafetensorError, OSError, ValueError, TypeError, RecursionError) as error:
             raise ModelError(
                 f"{path} is not a readable {self.what} ({one_line(error)}): expected a file that `{self.command}` "

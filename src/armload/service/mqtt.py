@@ -14,6 +14,7 @@ from armload.service.receiver import Health, is_host, without_user
 
 _KEPT = 1000  # messages that wait; then new ones are dropped
 _LONGEST = 60  # [s] between two trials to connect
+_NO_ROOM = 15  # MQTT_ERR_QUEUE_SIZE
 _PORTS = {"mqtt": 1883, "mqtts": 8883}
 
 
@@ -29,7 +30,7 @@ class Mqtt:
         url: mqtt://[USER:PASSWORD@]HOST[:PORT][/PREFIX], or mqtts:// with TLS. The prefix is "armload" without one.
 
     Attributes:
-        dropped: messages there was no room for. health: whether the broker takes messages.
+        health: whether the broker takes messages.
 
     Raises:
         UsageError: the address is not one, or paho-mqtt is not installed.
@@ -42,7 +43,7 @@ class Mqtt:
             from paho.mqtt.enums import CallbackAPIVersion
         except ImportError:
             raise UsageError(f"MQTT needs paho-mqtt, which is not installed: {install('paho')}") from None
-        self._prefix, self.dropped, self.health = parts.path.strip("/") or "armload", 0, Health("the MQTT broker")
+        self._prefix, self.health = parts.path.strip("/") or "armload", Health("the MQTT broker")
         self._client = client = Client(CallbackAPIVersion.VERSION2)
         client.max_queued_messages_set(_KEPT)
         client.reconnect_delay_set(1, _LONGEST)
@@ -59,23 +60,34 @@ class Mqtt:
         """Take a message to be sent; returns at once."""
         text = json.dumps(message, allow_nan=False)
         sent = self._client.publish(f"{self._prefix}/{message['arm']}/alarm", text, qos=1)
-        self.dropped += sent.rc == 15  # MQTT_ERR_QUEUE_SIZE; without a connection it waits
+        if sent.rc == _NO_ROOM:  # without a connection it waits
+            self.health.drop(f"{_KEPT} wait, new ones are dropped")
+
+    @property
+    def dropped(self) -> int:
+        """Messages there was no room for."""
+        return self.health.dropped
 
     def close(self) -> None:
         """Say that the service is gone, give what waits two more seconds, and end."""
-        last = self._client.publish(f"{self._prefix}/online", "false", qos=1, retain=True)
+        last = self._say_online("false", 1)  # behind the alarms
+        if last.rc == _NO_ROOM:
+            last = self._say_online("false", 0)
         if self._client.is_connected():
             with contextlib.suppress(RuntimeError, ValueError):
                 last.wait_for_publish(2.0)
         self._client.disconnect()
         self._client.loop_stop()
 
-    def _connected(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+    def _connected(self, _client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         if reason.is_failure:  # what a broker refuses comes here, too
             self.health.tell(f"refuses the connection: {reason}")
             return
         self.health.tell(None)
-        client.publish(f"{self._prefix}/online", "true", qos=1, retain=True)
+        self._say_online("true", 0)  # which needs no room: with 1000 alarms that wait there would be none
+
+    def _say_online(self, so: str, qos: int) -> Any:
+        return self._client.publish(f"{self._prefix}/online", so, qos=qos, retain=True)
 
     def _absent(self, *_: Any) -> None:
         self.health.tell("cannot be reached; it is tried again")

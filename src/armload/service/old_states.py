@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from armload.errors import IdentificationError
+from armload.errors import IdentificationError, UsageError
 from armload.runtime.atomic import clear_left_over, kept_alone
 
 _DIGITS = 8  # of the digest of an arm's settings in the name of its state
@@ -22,6 +22,29 @@ def state_file(folder: str | Path, name: str, settings: Mapping[str, Any]) -> Pa
     """Of the arm that is called `name`: other settings have another file."""
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:_DIGITS]
     return Path(folder) / f"{name}-{digest}.npz"
+
+
+def digest_of(key: str, path: Path) -> str:
+    """What stands for a file, or for all files in a folder, as a bag of ROS 2 is one, in the name of a state: SHA-256.
+
+    Args:
+        key: the setting that names it.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+    try:
+        return _digest(path)
+    except OSError as error:
+        raise UsageError(f"{key}: {error.filename or path} cannot be read: {error.strerror}") from None
+
+
+def _digest(path: Path) -> str:
+    if not path.is_dir():
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    files = sorted(file for file in path.rglob("*") if file.is_file())
+    return hashlib.sha256("".join(f"{file.relative_to(path)} {_digest(file)} " for file in files).encode()).hexdigest()
 
 
 class OldStates:

@@ -1,4 +1,4 @@
-"""What receivers of alarms have in common: why none is taken is logged when it changes, and no secret with it."""
+"""What receivers of alarms have in common: why none is taken, and that some are dropped, is logged, and no secret."""
 
 from __future__ import annotations
 
@@ -19,18 +19,37 @@ class Health:
         what: it is, as log lines begin.
 
     Attributes:
-        failed: why the last trial failed; None: it did not.
+        failed: why the last trial failed; None: it did not. dropped: alarms that it will never get.
     """
 
     def __init__(self, what: str) -> None:
         self._what = what
         self.failed: str | None = None
+        self.dropped = 0
+        self._unsaid = 0  # dropped since it took alarms last
 
     def tell(self, failed: str | None) -> None:
         """How the last trial went, which is logged where the one before went otherwise."""
-        if failed != self.failed:
-            self.failed = failed
-            logging.getLogger("armload").warning("%s %s", self._what, failed or "takes alarms again")
+        if failed == self.failed:
+            return
+        self.failed, unsaid = failed, self._unsaid
+        said = failed or "takes alarms again"
+        if failed is None and unsaid:
+            said, self._unsaid = f"{said}; {unsaid} {'was' if unsaid == 1 else 'were'} dropped", 0
+        self._log(said)
+
+    def drop(self, why: str | None = None) -> None:
+        """An alarm is dropped; how many were is logged once the receiver takes alarms again.
+
+        Args:
+            why: logged with the first of them; None: that is told already.
+        """
+        self.dropped, self._unsaid = self.dropped + 1, self._unsaid + 1
+        if self._unsaid == 1 and why is not None:
+            self._log(f"does not get all alarms: {why}")
+
+    def _log(self, said: str) -> None:
+        logging.getLogger("armload").warning("%s %s", self._what, said)
 
 
 def without_user(url: str) -> str:

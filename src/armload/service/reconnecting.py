@@ -10,15 +10,13 @@ from armload.devices import Detached, Source
 from armload.errors import ArmloadError, SourceError, SourceSetupError, one_line
 from armload.inertia import InertialParameters
 from armload.recording import Sample
-from armload.service.backoff import Backoff
+from armload.service.backoff import Backoff, Reasons
 from armload.service.transit import Transit
 from armload.service.unknown import Link
 
 STALLED = 3.0  # [s] without a sample after which the connection counts as lost: two lost TCP packets cost three
 BEGUN = 10.0  # [s] the same before its first: a simulator computes for a second, on a busy or small machine for several
 BEHIND = 1.0  # [s] a sample may wait before the newest takes its place: saving a state takes a tenth
-# [s] between two words of a reason that stays: a robot that is off over the weekend is tried twelve times a minute
-REMINDED = 600.0
 
 
 class Reconnecting(Source):
@@ -65,8 +63,7 @@ class Reconnecting(Source):
         self._trial: threading.Thread | None = None
         self._made: Detached | Exception | None = None  # by the trial
         self._lost, self._late, self._gone = 0, 0.0, threading.Event()
-        self._transit, self._backoff = Transit(), Backoff()
-        self._told: tuple[str, float, float] | None = None  # the last reason, the wait then, and when [s, monotonic]
+        self._transit, self._backoff, self._reasons = Transit(), Backoff(), Reasons()
         if first is not None:
             self._take(first)
 
@@ -209,10 +206,7 @@ class Reconnecting(Source):
         return not self._comes or isinstance(error, SourceSetupError)
 
     def _tell(self, why: str, wait: float, what: str) -> None:
-        """Say why it is lost, as often as the wait grows, and then every `REMINDED`."""
-        now = time.monotonic()
-        if self._told is None or self._told[:2] != (why, wait) or now - self._told[2] >= REMINDED:
-            self._told = why, wait, now
+        if self._reasons.due(why, wait, time.monotonic()):
             self._said(f"{why}; it is {what} again in {wait:.1f} s")
 
     def _waited(self, wait: float, tick: float) -> Iterator[None]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from armload.arms import arm, rated_mass
 from armload.service.alarms import Alarm, Alarms
-from armload.service.backoff import Backoff
+from armload.service.backoff import Backoff, Reasons
 from armload.service.mqtt import Mqtt
 from armload.service.settings import ArmSettings, ServiceSettings
 from armload.service.spare import Spare, order
@@ -120,7 +120,7 @@ class Service:
 
     def _keep(self, settings: ArmSettings) -> None:
         """Keep an arm's process running."""
-        backoff, name = Backoff(), settings.name
+        backoff, reasons, name = Backoff(), Reasons(), settings.name
         while not self._gone.is_set():
             began = time.monotonic()
             with self._state:
@@ -129,7 +129,8 @@ class Service:
             if how is None or self._gone.is_set():
                 break
             wait = backoff.failed(time.monotonic() - began)
-            self._note(name, f"its process {how}; it is started again in {wait:.1f} s")
+            if reasons.due(how, wait, time.monotonic()):
+                self._note(name, f"its process {how}; it is started again in {wait:.1f} s")
             with self._state:
                 self._restarts[name] += 1
                 # "t" says that it has answered, and compiling need not be waited for

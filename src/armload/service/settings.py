@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import json
 import math
 import re
@@ -20,7 +19,7 @@ from armload.recording.growing_file import RECORDS
 from armload.service.access import is_loopback, read_token
 from armload.service.idle import check_arm, check_service
 from armload.service.mqtt import checked
-from armload.service.old_states import state_file
+from armload.service.old_states import digest_of, state_file
 from armload.service.webhook import check_webhook
 
 if TYPE_CHECKING:
@@ -127,7 +126,11 @@ class ArmSettings(ArmOptions, KnownOptions):
 
     @property
     def state(self) -> Path | None:
-        """The file of the identifier's state. Other settings have another name: a state with another tare is none."""
+        """The file of the identifier's state. Other settings have another name: a state with another tare is none.
+
+        Raises:
+            UsageError: a file that it names cannot be read.
+        """
         if self.save is None:
             return None
         given = {f.name for f in dataclasses.fields(self) if f.name in _IN_STATE or getattr(self, f.name) != f.default}
@@ -135,7 +138,7 @@ class ArmSettings(ArmOptions, KnownOptions):
         asked["rate"] = _RATE if self.rate is None else self.rate  # as versions wrote it that had no other word for it
         for key in ("tare", "profile", "tool", "body"):
             if asked.get(key) is not None and ((path := Path(asked[key])).is_file() or path.is_dir()):
-                asked[key] = [asked[key], _digest(path)]
+                asked[key] = [asked[key], digest_of(key, path)]
         return state_file(self.save, self.name, asked)
 
     def mounted_on(self, bare: Arm) -> InertialParameters | None:
@@ -199,15 +202,6 @@ class ServiceSettings:
                 f"the endpoint at {self.host} can be reached from other machines: "
                 "give it a token, or the host 127.0.0.1"
             )
-
-
-def _digest(path: Path) -> str:
-    """SHA-256 of a file, or of all files in a folder, as a bag of ROS 2 is one."""
-    if not path.is_dir():
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    files = sorted(file for file in path.rglob("*") if file.is_file())
-    return hashlib.sha256("".join(f"{file.relative_to(path)} {_digest(file)} " for file in files).encode()).hexdigest()
 
 
 def read_settings(path: str | Path, **over: Any) -> ServiceSettings:

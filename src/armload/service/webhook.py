@@ -78,7 +78,7 @@ class Webhook:
         url: http:// or https://. headers: sent with each message, as `Authorization`.
 
     Attributes:
-        sent, dropped: messages. health: whether the last was taken.
+        sent: messages. health: whether the last was taken.
 
     Raises:
         UsageError: the address is none, or a header cannot be sent.
@@ -87,19 +87,23 @@ class Webhook:
     def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
         check_webhook(url, headers or {})
         self.url, self._headers = url, {"Content-Type": "application/json", **(headers or {})}
-        self.sent = self.dropped = 0
-        self.health = Health("the webhook")
+        self.sent, self.health = 0, Health("the webhook")
         self._waiting: deque[bytes] = deque()
         self._there, self._gone = threading.Condition(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="armload-webhook", daemon=True)
         self._thread.start()
+
+    @property
+    def dropped(self) -> int:
+        """Messages that were given up."""
+        return self.health.dropped
 
     def post(self, message: Mapping[str, Any]) -> None:
         """Take a message to be sent; returns at once."""
         with self._there:
             if len(self._waiting) >= _KEPT:
                 self._waiting.popleft()
-                self.dropped += 1
+                self.health.drop(f"{_KEPT} wait, the oldest are dropped")
             self._waiting.append(json.dumps(message, allow_nan=False).encode())
             self._there.notify()
 
@@ -124,7 +128,7 @@ class Webhook:
                     return
                 continue
             backoff = Backoff(1.0, _LONGEST)
-            self.sent, self.dropped = self.sent + taken, self.dropped + (not taken)
+            self.sent += taken
             with self._there:
                 if self._waiting and self._waiting[0] is message:
                     self._waiting.popleft()
@@ -138,12 +142,14 @@ class Webhook:
         except urllib.error.HTTPError as error:
             error.close()
             taken = False if 400 <= error.code < 500 and error.code not in (408, 429) else None
-            failed = f"answered {error.code}"
+            failed = f"answered {error.code}" + (": what it answers so is dropped" if taken is False else "")
             if 300 <= error.code < 400:
                 failed += ", that it is elsewhere: give the address it is at"
         except (OSError, ValueError, HTTPException) as error:
             taken, failed = None, f"did not answer: {one_line(error)}"
         self.health.tell(failed)
+        if taken is False:
+            self.health.drop()
         return taken
 
 
