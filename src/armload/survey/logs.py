@@ -202,7 +202,7 @@ def _lines(file: Path) -> list[str]:
 
 
 def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[Log]:
-    """Every unit behind a path, of no arm yet; links to folders are followed last, so that logs are found where they lie.
+    """Every unit behind a path, of no arm yet; links to folders come last, so that logs are found where they lie.
 
     hidden: real paths that are passed over (`Path.resolve` raises of a loop of links); a folder is one from then on.
     passed: as of `find_logs`.
