@@ -124,6 +124,12 @@ def test_logs_that_leave_a_table_are_named_before_it_is_replaced(logs, tmp_path,
     assert not any("leaves" in line for line in said)
 
 
+def test_a_file_where_the_cells_would_be_kept_is_named_before_a_log_is_read(logs, tmp_path):
+    (tmp_path / "out.csv.cells").write_text("")
+    with pytest.raises(UsageError, match=r"out\.csv\.cells is there and is no folder: .* give another --out"):
+        survey([str(logs / "0.csv")], SETTINGS, tmp_path / "out.csv", jobs=1, say=pytest.fail)
+
+
 @pytest.mark.parametrize("form", ["csv", "json", "parquet"])
 def test_a_table_about_another_arm_of_the_same_logs_is_named_and_its_answers_are_kept(logs, tmp_path, form):
     out, said = tmp_path / f"out.{form}", []

@@ -70,15 +70,19 @@ def survey(
         progress: called as progress(done, total) after every log. say: called with what is being done.
 
     Raises:
-        UsageError: no log was found, something that is named for all logs is not there, or `out` is there and is not
-            the table of a survey.
+        UsageError: no log was found, something that is named for all logs is not there, or `out`, or what stands where
+            its cells are kept, is there and is not of a survey.
         ArmloadError: the arm or the method is unknown, or a profile, a tool or a model cannot be read.
         OSError: the table or a cell cannot be written.
         ModuleNotFoundError: what writes the table is not installed; no log is read.
     """
     out, jobs = check_suffix(out), jobs or os.cpu_count() or 1
     require_form(out)
-    folder = cells_of(out)
+    if (folder := cells_of(out)).exists() and not folder.is_dir():
+        raise UsageError(
+            f"{folder} is there and is no folder: expected none, or that of a survey, which keeps there what is "
+            "answered; move it away, or give another --out"
+        )
     named = [Path(p) for p in (settings.tool, settings.tare, settings.profile) if p is not None]
     earlier = _earlier(out)
     logs = find_logs(paths, arm_of, without=[out, folder, *named], passed=(passed := set()))
