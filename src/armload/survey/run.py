@@ -107,10 +107,9 @@ def survey(
     before = load_cells(folder, damaged := [])
     if damaged:
         say(of_damaged(damaged))
-    keys, frame = {key for _, key in earlier}, settings.arm().frame
-    if remark := of_frames(
-        out, {cell.get("frame", frame) for cell in before.values() if cell.get("key") in keys}, frame
-    ):
+    keys, frame = {key for _, key in earlier}, str(settings.arm().frame)
+    frames = {cell.get("frame", frame) for cell in before.values() if cell.get("key") in keys}
+    if remark := of_frames(out, frames, frame):
         say(remark)
     # what was answered once may be away for a while: its row says so
     if not any(log.there or _name(log, settings) in before for log in logs):
