@@ -1,13 +1,18 @@
-"""A cluster that has no workers is waited for, and not for ever."""
+"""A cluster that has no workers is waited for, and not for ever; processes leave Ctrl-C to whoever began them."""
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 
 import pytest
 
 from armload.errors import ClusterError
-from armload.lab.engine import Engine
+from armload.lab.engine import Engine, engine
 
 distributed = pytest.importorskip("distributed")
 
@@ -37,3 +42,48 @@ def test_a_worker_that_comes_late_does_all_tasks(cluster):
         found = list(Engine(1, client, patience=120.0).each(double, lambda: range(5)))
         late.join()
     assert sorted(found) == [(k, 2 * k) for k in range(5)]
+
+
+def hears_ctrl_c(_):
+    """This process, and whether it hears Ctrl-C."""
+    return os.getpid(), signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+@pytest.mark.parametrize("name", [None, pytest.param("local", marks=pytest.mark.full)])
+def test_processes_leave_ctrl_c_to_the_one_that_began_them_and_end_before_it(name):
+    with engine(2, name) as on:
+        found = dict(there for _, there in on.each(hears_ctrl_c, lambda: range(6)))
+        assert hears_ctrl_c(0) == (os.getpid(), True)
+    assert set(found.values()) == {False}
+    for process in found:
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)
+
+
+SLEEPY = """
+import sys, time
+from armload.app.cli import entry
+from armload.lab.engine import engine
+
+def run(_):
+    with engine(2) as on:
+        def items():
+            print("begun", flush=True)
+            yield from [60.0, 60.0]
+        list(on.each(time.sleep, items))
+
+entry._run = run
+sys.exit(entry.main([]))
+"""
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.3, 0.6])
+def test_ctrl_c_while_processes_begin_is_one_line(seconds):
+    words = [sys.executable, "-c", SLEEPY]
+    command = subprocess.Popen(words, stdout=-1, stderr=-1, text=True, start_new_session=True)
+    assert command.stdout is not None
+    command.stdout.readline()
+    time.sleep(seconds)
+    os.killpg(command.pid, signal.SIGINT)  # as a terminal does
+    assert command.communicate(timeout=60.0) == ("", "armload: interrupted\n")
+    assert command.returncode == 130

@@ -39,6 +39,17 @@ def test_links_among_folders_lead_to_no_log_twice(folder):
     assert names(find_logs([str(folder)]), folder) == ["cell-1/a.csv", "cell-1/deep/b.npz", "cell-2/c.mcap"]
 
 
+def test_a_folder_that_a_link_leads_to_is_that_of_its_own_arm(folder):
+    """`cell-0` comes first by name, and would be the arm of the logs of cell-2."""
+    (folder / "cell-0").symlink_to("cell-2")
+    assert [(log.arm, log.name) for log in find_logs([str(folder)])][-1] == ("cell-2", f"{folder}/cell-2/c.mcap")
+    far = folder.parent / f"{folder.name}-far"
+    far.mkdir()
+    (far / "d.csv").write_text("x")
+    (folder / "cell-3").symlink_to(far)
+    assert names(find_logs([str(folder)]), folder)[-2:] == ["cell-2/c.mcap", "cell-3/d.csv"]
+
+
 def test_a_packed_log_is_a_log_and_one_that_cannot_be_unpacked_here_says_so(folder):
     (folder / "cell-1" / "old.csv.gz").write_text("x")
     (folder / "cell-1" / "older.csv.zst").write_text("x")

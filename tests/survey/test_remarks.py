@@ -3,6 +3,7 @@
 import gzip
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -121,6 +122,28 @@ def test_logs_that_leave_a_table_are_named_before_it_is_replaced(logs, tmp_path,
     found, said = said_of([logs], out)  # nothing was lost: none is answered again
     assert (found.logs, found.anew) == (2, 0)
     assert not any("leaves" in line for line in said)
+
+
+def test_a_file_where_the_cells_would_be_kept_is_named_before_a_log_is_read(logs, tmp_path):
+    (tmp_path / "out.csv.cells").write_text("")
+    with pytest.raises(UsageError, match=r"out\.csv\.cells is there and is no folder: .* give another --out"):
+        survey([str(logs / "0.csv")], SETTINGS, tmp_path / "out.csv", jobs=1, say=pytest.fail)
+
+
+@pytest.mark.parametrize("form", ["csv", "json", "parquet"])
+def test_a_table_about_another_arm_of_the_same_logs_is_named_and_its_answers_are_kept(logs, tmp_path, form):
+    out, said = tmp_path / f"out.{form}", []
+    one, other = SETTINGS, replace(SETTINGS, frame="panda_link7")
+    (logs / "0.csv").write_text("this is no log\n")
+    survey([str(logs / "0.csv")], one, out, jobs=1, say=said.append)
+    first = out.read_bytes()
+    survey([str(logs / "0.csv")], one, out, jobs=1, say=said.append)
+    assert not any("frame" in line for line in said)
+    survey([str(logs / "0.csv")], other, out, jobs=1, say=said.append)
+    expected = f"{out} is about the frame panda_link8: the new table, about panda_link7, takes its place; "
+    assert [line for line in said if line.startswith(expected)]
+    assert survey([str(logs / "0.csv")], one, out, jobs=1).anew == 0
+    assert out.read_bytes() == first
 
 
 def test_a_table_never_takes_the_place_of_a_log(logs):

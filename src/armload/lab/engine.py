@@ -12,17 +12,19 @@ from __future__ import annotations
 import logging
 import os
 import re
+import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, TypeVar
 
 from armload.errors import ClusterError, UsageError
+from armload.runtime.interruption import unheard_by_processes
 
 # times that a task may lose its process: once beside others, whose fault it may have been, and once alone
 ATTEMPTS = 3
@@ -92,7 +94,13 @@ class Engine:
         with warnings.catch_warnings():
             # joblib says so when a process of its pool has ended; what was lost is given out again
             warnings.filterwarnings("ignore", message=".*A worker stopped while some jobs were given.*")
-            yield from parallel(n_jobs=jobs, **how)(delayed(_with_item)(os.getpid(), work, item) for item in items)
+            # and of an interruption, that its tasks were cancelled
+            warnings.filterwarnings("ignore", message=".*adjusting the input task iterator.*")
+            with ExitStack() as stack:
+                with unheard_by_processes():  # begins them
+                    found = parallel(n_jobs=jobs, **how)(delayed(_with_item)(os.getpid(), work, item) for item in items)
+                    stack.callback(found.close)
+                yield from found
 
     def _spread(self, work: Callable[[T], R], items: Iterable[T], killed: list[T]) -> Iterator[tuple[T, R]]:
         """As `each`, on the cluster; those whose worker was killed again and again come to stand in `killed`.
@@ -176,7 +184,10 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
         ModuleNotFoundError: Dask is not installed.
     """
     if cluster is None:
-        yield Engine(jobs)
+        try:
+            yield Engine(jobs)
+        finally:
+            _end_processes()
         return
     if cluster != "local" and not _ADDRESS.match(cluster):
         raise UsageError(
@@ -187,6 +198,7 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
 
     if cluster == "local":
         settings = {"n_workers": jobs, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
+        settings["silence_logs"] = logging.CRITICAL  # of its workers, what is wrong with them is said in one sentence
         # Dask asks malloc to trim at 64 kB, which has every array of some size mapped and unmapped anew; tasks run in a
         # thread there, which has an arena of malloc of its own that is trimmed as eagerly: let there be one
         spawned = dict(dask.config.get("distributed.nanny.pre-spawn-environ", {}))
@@ -194,7 +206,7 @@ def engine(jobs: int = 1, cluster: str | None = None) -> Iterator[Engine]:
         spawned["MALLOC_ARENA_MAX"] = "1"
         # and it looks at the stack of each task a hundred times a second, for its dashboard
         of_workers = {"distributed.nanny.pre-spawn-environ": spawned, "distributed.worker.profile.enabled": False}
-        with dask.config.set(of_workers):
+        with dask.config.set(of_workers), unheard_by_processes():
             made: Any = distributed.LocalCluster(**settings)
     else:
         made = cluster
@@ -227,6 +239,14 @@ def _gone() -> Iterator[None]:
         raise
     except (OSError, CancelledError, ClosedClientError):
         raise ClusterError(_GONE) from None
+
+
+def _end_processes() -> None:
+    """End the processes of joblib: left to the end of Python, an interruption meanwhile would be a traceback."""
+    loky = sys.modules.get("joblib.externals.loky.reusable_executor")  # to ask it for its pool would make one
+    pool = getattr(loky, "_executor", None)
+    if pool is not None:
+        pool.shutdown(kill_workers=True)
 
 
 def _with_item(parent: int, work: Callable[[T], R], item: T) -> tuple[T, R]:

@@ -1,4 +1,5 @@
-"""Ctrl-C held back, while an arm moves or modules load that would swallow it; other signals that end as it does."""
+"""Ctrl-C held back, while an arm moves or modules load that would swallow it, or from processes that are ended by the
+one that began them; other signals that end as it does."""
 
 from __future__ import annotations
 
@@ -46,6 +47,23 @@ def held_back() -> Iterator[Interruption]:
             signal.signal(number, handler)
         if interruption.name is not None:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def unheard_by_processes() -> Iterator[None]:
+    """Within, processes and threads that are begun never hear Ctrl-C; whoever begins them hears it at the end.
+
+    A terminal sends it to every process of a command. The first of them ends the others, which would only print where
+    each of them was.
+    """
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # it unblocks the signal where it is begun
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def ended_by_sigterm() -> AbstractContextManager[None]:

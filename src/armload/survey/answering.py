@@ -32,7 +32,8 @@ def answer_log(log: Log, settings: Settings, key: str, stamp: str, content: str)
             return _anew(unusable(str(error), about))
     if stamp and len(rows) == 1 and rows[0]["status"] == UNUSABLE and not _stayed(log, stamp):
         return _anew(rows[0])
-    return {"rows": rows, "stamp": stamp, "content": content, "unpacked": _unpacked(log, content)}
+    told = {"stamp": stamp, "content": content, "unpacked": _unpacked(log, content)}
+    return {"rows": rows, "frame": settings.arm().frame} | told
 
 
 def lost_log(log: Log, key: str) -> dict[str, Any]:

@@ -202,11 +202,18 @@ def _lines(file: Path) -> list[str]:
 
 
 def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[Log]:
-    """Every unit behind a path, of no arm yet.
+    """Every unit behind a path, of no arm yet; links to folders come last, so that logs are found where they lie.
 
     hidden: real paths that are passed over (`Path.resolve` raises of a loop of links); a folder is one from then on.
     passed: as of `find_logs`.
     """
+    ways = [path]
+    for way in ways:
+        yield from _units_of(way, hidden, passed, ways)
+
+
+def _units_of(path: str, hidden: set[str], passed: set[str], links: list[str]) -> Iterator[Log]:
+    """As `_units`, without what links in it lead to, if these are folders: they are added to `links`."""
     here = Path(path)
     if is_url(path):
         yield Log(path)
@@ -221,8 +228,11 @@ def _units(path: str, hidden: set[str], passed: set[str]) -> Iterator[Log]:
         for inner in inside:
             if inner.name.startswith(".") or os.path.realpath(inner) in hidden or of_survey(inner):
                 continue
-            if os.path.isdir(inner) or (is_log(inner) and not is_special(inner)):
-                yield from _units(str(inner), hidden, passed)
+            is_folder = os.path.isdir(inner)
+            if is_folder and os.path.islink(inner):
+                links.append(str(inner))
+            elif is_folder or (is_log(inner) and not is_special(inner)):
+                yield from _units_of(str(inner), hidden, passed, links)
             elif os.path.isfile(inner) and may_be_log(inner):
                 passed.add(str(inner))
 

@@ -61,6 +61,17 @@ def of_left_out(out: Path, before: Collection[str], now: Collection[str]) -> str
     )
 
 
+def of_frames(out: Path, before: Collection[str], now: str) -> str:
+    """The sentence on other frames that a table, in whose place a new one comes, is about; empty: there are none."""
+    others = sorted(set(before) - {now})
+    if not others:
+        return ""
+    return (
+        f"{out} is about the frame {', '.join(others)}: the new table, about {now}, takes its place; to have both give "
+        "another --out (what was answered is kept: with the same --frame again, no log is answered twice)"
+    )
+
+
 def of_bags(logs: Iterable[tuple[str, Sequence[Path]]]) -> str:
     """The sentence on logs (name, files) that are bags by the names of several files alone; empty: there are none."""
     parts = {

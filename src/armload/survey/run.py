@@ -22,7 +22,7 @@ from armload.lab.cells import load_cells, of_damaged
 from armload.lab.experiment import Task, run_tasks
 from armload.survey.answering import answer_log, lost_log
 from armload.survey.logs import Log, cells_of, find_logs
-from armload.survey.remarks import copies_among, of_bags, of_copies, of_left_out, of_passed
+from armload.survey.remarks import copies_among, of_bags, of_copies, of_frames, of_left_out, of_passed
 from armload.survey.rows import UNUSABLE, as_copy
 from armload.survey.settings import Settings
 from armload.survey.table_file import check_suffix, logs_in_table, require_form, whole, write_rows
@@ -70,15 +70,19 @@ def survey(
         progress: called as progress(done, total) after every log. say: called with what is being done.
 
     Raises:
-        UsageError: no log was found, something that is named for all logs is not there, or `out` is there and is not
-            the table of a survey.
+        UsageError: no log was found, something that is named for all logs is not there, or `out`, or what stands where
+            its cells are kept, is there and is not of a survey.
         ArmloadError: the arm or the method is unknown, or a profile, a tool or a model cannot be read.
         OSError: the table or a cell cannot be written.
         ModuleNotFoundError: what writes the table is not installed; no log is read.
     """
     out, jobs = check_suffix(out), jobs or os.cpu_count() or 1
     require_form(out)
-    folder = cells_of(out)
+    if (folder := cells_of(out)).exists() and not folder.is_dir():
+        raise UsageError(
+            f"{folder} is there and is no folder: expected none, or that of a survey, which keeps there what is "
+            "answered; move it away, or give another --out"
+        )
     named = [Path(p) for p in (settings.tool, settings.tare, settings.profile) if p is not None]
     earlier = _earlier(out)
     logs = find_logs(paths, arm_of, without=[out, folder, *named], passed=(passed := set()))
@@ -93,7 +97,7 @@ def survey(
         if without := settings.arms_without(what, arms):
             of = ", ".join(without[:_MOST_NAMED]) + ", …" * (len(without) > _MOST_NAMED)
             say(f"no --{what} {getattr(settings, what)} of {len(without)} of {len(arms)} arms ({of}): answered without")
-    left_out = of_left_out(out, earlier, {whole(log.name) for log in logs})
+    left_out = of_left_out(out, {name for name, _ in earlier}, {whole(log.name) for log in logs})
     for remark in (of_passed(sorted(passed)), of_bags((log.name, log.files) for log in logs), left_out):
         if remark:
             say(remark)
@@ -103,12 +107,16 @@ def survey(
     before = load_cells(folder, damaged := [])
     if damaged:
         say(of_damaged(damaged))
+    keys, frame = {key for _, key in earlier}, str(settings.arm().frame)
+    frames = {cell.get("frame", frame) for cell in before.values() if cell.get("key") in keys}
+    if remark := of_frames(out, frames, frame):
+        say(remark)
     # what was answered once may be away for a while: its row says so
-    if not any(log.there or _name(log) in before for log in logs):
+    if not any(log.there or _name(log, settings) in before for log in logs):
         raise UsageError(f"{', '.join(paths)}: no such file or folder: expected logs, folders, globs or URLs")
     say(f"{count}: asking which have changed")
     with ThreadPoolExecutor(jobs) as pool:
-        tasks = list(pool.map(lambda log: _task(log, settings, before.get(_name(log))), logs))
+        tasks = list(pool.map(lambda log: _task(log, settings, before.get(_name(log, settings))), logs))
     fresh = {t.name for t in tasks if before.get(t.name, {}).get("key") != t.keys[t.name]}
     say(f"{count}, {len(fresh)} of them new or changed")
     cells = run_tasks(
@@ -131,8 +139,8 @@ def survey(
     return Survey(rows, len(logs), len(fresh), tuple(sorted(passed)))
 
 
-def _earlier(out: Path) -> set[str]:
-    """The logs of the table that will be replaced.
+def _earlier(out: Path) -> set[tuple[str, str]]:
+    """The logs of the table that will be replaced, with the keys of their rows.
 
     Raises:
         UsageError: what is there is no table of a survey, but a log, say.
@@ -154,9 +162,9 @@ def _check_method(settings: Settings) -> None:
         choose(settings.arm(), method=settings.method)
 
 
-def _name(log: Log) -> str:
-    """Of a log's cell: what kind of file systems allow, and what tells logs of one name apart."""
-    text = f"{log.name}\n{log.episode}"
+def _name(log: Log, settings: Settings) -> str:
+    """Of a log's cell: what kind of file systems allow; it tells logs of one name apart, and two arms of a log."""
+    text = f"{log.name}\n{log.episode}" + ("" if settings.frame is None else f"\n{settings.frame}")
     return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()[:24]  # a name on disk may be no UTF-8
 
 
@@ -167,7 +175,7 @@ def _task(log: Log, settings: Settings, before: dict[str, Any] | None) -> Task:
         content = before["content"] if same and before is not None else log.content()
     except (OSError, ValueError):  # its row will say why
         stamp, content = "", _MISSING
-    key, name = settings.key(log, content), _name(log)
+    key, name = settings.key(log, content), _name(log, settings)
     return Task.of_one(name, key, answer_log, log, settings, key, stamp, content)
 
 

@@ -99,22 +99,23 @@ def read_rows(path: str | Path) -> tuple[list[dict[str, Any]], int]:
         ) from None
 
 
-def logs_in_table(path: Path) -> set[str] | None:
-    """The logs that a survey's table names, of whatever version; None: it is no such table."""
+def logs_in_table(path: Path) -> set[tuple[str, str]] | None:
+    """The logs that a survey's table names, with the keys of their rows, of whatever version; None: no such table."""
     try:
         if path.suffix.lower() == ".parquet":
             from pyarrow import parquet
 
             names = set(parquet.read_schema(path).names)
-            logs = parquet.read_table(path, columns=["log"], use_threads=False)["log"].to_pylist()
+            rows = parquet.read_table(path, columns=["log", "key"], use_threads=False).to_pylist()
         elif path.suffix.lower() == ".csv":
             with path.open(encoding="utf-8", newline="") as file:
                 reader = csv.DictReader(file)
-                names, logs = set(reader.fieldnames or ()), [row["log"] for row in reader]
+                names = set(reader.fieldnames or ())
+                rows = [{"log": row["log"], "key": row.get("key", "")} for row in reader]
         else:
             rows = json.loads(path.read_text(encoding="utf-8"))
-            names, logs = set(rows[0]), [row["log"] for row in rows]
-        return set(logs) if names >= _OF_SURVEY else None
+            names = set(rows[0])
+        return {(row["log"], row.get("key", "")) for row in rows} if names >= _OF_SURVEY else None
     except ModuleNotFoundError:
         raise
     except Exception:  # a damaged file can fail anywhere in the decoder
