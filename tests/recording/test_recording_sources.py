@@ -225,12 +225,47 @@ def test_a_log_by_the_joints_own_names_is_put_into_the_arms_order(tmp_path):
     same(read_recording(write(tmp_path / "log.csv", columns), PANDA), log)
 
 
-def test_a_stamp_in_two_parts_is_read_to_the_nanosecond(tmp_path):
+@pytest.mark.parametrize(
+    "parts",
+    [
+        ("header.stamp.sec", "header.stamp.nanosec"),
+        ("stamp_secs", "stamp_nsecs"),
+        ("sec", "nanosec"),
+        ("time.sec", "time.nsec"),
+        ("Seconds", "Nanoseconds"),
+    ],
+)
+def test_a_stamp_in_two_parts_is_read_to_the_nanosecond(tmp_path, parts):
     log = canonical(PANDA)
     columns = plain(log, "position.{}", "velocity.{}", "effort.{}", None)
-    columns["header.stamp.sec"] = [stamp // 10**9 for stamp in stamps(log)]
-    columns["header.stamp.nanosec"] = [stamp % 10**9 for stamp in stamps(log)]
+    columns[parts[1]] = [stamp % 10**9 for stamp in stamps(log)]
+    columns[parts[0]] = [stamp // 10**9 for stamp in stamps(log)]
     same(read_recording(write(tmp_path / "log.csv", columns), PANDA), log)
+
+
+def test_seconds_and_nanoseconds_that_are_not_parts_of_one_stamp_are_refused(tmp_path):
+    log = canonical(PANDA)
+    columns = plain(log, "position.{}", "velocity.{}", "effort.{}", None)
+    columns |= {"sec": [stamp // 10**9 for stamp in stamps(log)], "nanosec": stamps(log)}
+    with pytest.raises(RecordingError, match=r"'nanosec' holds 1[0-9]+: expected fewer than 1e9 nanoseconds, beside"):
+        read_recording(write(tmp_path / "log.csv", columns), PANDA)
+    same(read_recording(tmp_path / "log.csv", PANDA, columns="t=nanosec,t_unit=ns"), log)
+    columns["time"] = log.t.tolist()  # another clock, too
+    columns["nanosec"] = [stamp % 10**9 for stamp in stamps(log)]
+    same(read_recording(write(tmp_path / "log.csv", columns), PANDA), log)
+
+
+def test_a_log_of_pyfri_has_measured_positions_and_torques(tmp_path):
+    iiwa = arm("iiwa14")
+    log = canonical(iiwa)
+    columns = {"index": list(range(len(log))), "time": log.t.tolist(), "record_time_nsec": stamps(log)}
+    columns |= {"tsec": [stamp // 10**9 for stamp in stamps(log)], "tnsec": [stamp % 10**9 for stamp in stamps(log)]}
+    for name, values in (("mp", log.q), ("ip", log.q + 0.01), ("mt", log.tau), ("et", 0.1 * log.tau)):
+        columns |= {f"{name}{k + 1}": values[:, k].tolist() for k in range(7)}
+    found = read_recording(write(tmp_path / "log.csv", columns | {"dt": [0.002] * len(log)}), iiwa)
+    assert np.array_equal(found.q, log.q)
+    assert np.array_equal(found.tau, log.tau)
+    assert np.allclose(found.t - found.t[0], log.t - log.t[0], rtol=0.0, atol=1e-9)
 
 
 def test_ros2_topic_echo_as_csv_reads(tmp_path):

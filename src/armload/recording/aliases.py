@@ -16,6 +16,7 @@ is left out. Sources, in the order of the tables:
 - Kinova's Kortex, `BaseCyclic.Feedback`: actuators[0].position, .velocity, .torque; degrees.
 - Simulink: `tout` beside what a model logs; signals.values of a structure with time.
 - NIST's robot measurements: ROBOT_ACTUAL_JOINT_POSITIONS (J1) …
+- pyfri (lbr-stack), `collect_data`: mp1 …, mt1 … are measured, ip1 … interpolated, et1 … external; no velocities.
 - polymetis (DROID), `franka_torque_control_client.cpp`: motor_torques_measured is libfranka's tau_J.
 """
 
@@ -29,9 +30,9 @@ CALLED = {"t": "time", "q": "position", "dq": "velocity", "tau": "torque"}
 
 # what is left of a name without index, joint and neutral words: the quantity it holds
 WORDS = {
-    **dict.fromkeys(("q", "qpos", "jpos", "pos", "position", "positions", "angle", "angles"), "q"),
+    **dict.fromkeys(("q", "qpos", "jpos", "pos", "position", "positions", "angle", "angles", "theta"), "q"),
     **dict.fromkeys(
-        ("dq", "qd", "qdot", "q_dot", "qvel", "jvel", "vel", "velocity", "velocities", "speed", "speeds"), "dq"
+        ("dq", "qd", "qdot", "q_dot", "qvel", "jvel", "vel", "velocity", "velocities", "speed", "speeds", "omega"), "dq"
     ),
     **dict.fromkeys(("tau", "torque", "torques", "trq", "eff", "effort", "efforts"), "tau"),
 }
@@ -57,6 +58,8 @@ WHOLE = {
     "observation_state": ("q", "measured"),
     "motor_torques_measured": ("tau", "measured"),
     "observation_robot_state_motor_torques_measured": ("tau", "measured"),
+    "mp": ("q", "measured"),
+    "mt": ("tau", "measured"),
     "target_moment": ("tau", "desired"),  # what the controller's model expects for the payload that is set
     "actual_current_as_torque": ("tau", "external"),  # gravity is taken out already: see devices/ur/source.py
 }
@@ -68,6 +71,9 @@ MOMENTS = frozenset(("moment", "moments"))  # what RTDE calls the torque that is
 TIMES = frozenset(
     ("t", "time", "timestamp", "timestamps", "stamp", "header_stamp", "time_stamp", "elapsed", "elapsed_time", "tout")
 )
+# seconds and nanoseconds in columns of their own: the fields of a stamp in ROS 1 and ROS 2, and what a message's is in
+PARTS = {"sec": ("nanosec", "nsec"), "secs": ("nsecs", "nanosecs"), "seconds": ("nanoseconds",)}
+CLOCKS = TIMES | {"header"}
 NAMES = frozenset({"name", "names"})
 EPISODE = "episode_index"
 
@@ -118,5 +124,6 @@ FORMS = (
     Form("PlotJuggler", ("__time",), ("__time",), "s", r"/.*/header/stamp(/\w+)?"),
     Form("RTDE", ("actual_q", "actual_qd"), ("timestamp",), "s"),
     Form("LeRobot", ("observation_state", "episode_index"), ("timestamp",), "s"),
+    Form("pyfri", ("mp", "ip", "mt", "et"), ("time",), "s", "record_time_nsec|tsec|tnsec"),
     Form("polymetis", (_POLYMETIS,), (), "s", torque=_POLYMETIS),
 )

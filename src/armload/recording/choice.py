@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from armload.arms import Arm
 from armload.errors import RecordingError
-from armload.recording.aliases import CALLED, TIME_UNITS, Form
+from armload.recording.aliases import CALLED, CLOCKS, PARTS, TIME_UNITS, Form
 from armload.recording.column_spec import ColumnSpec
-from armload.recording.header import Family, Reading
+from armload.recording.header import Family, Reading, words_of
 from armload.recording.templates import abridged, place_of
 
 WHY_NOT = {
@@ -134,12 +134,8 @@ class Header:
             if known and not strange and known[0] not in self.dates:
                 unit = spec.t_unit or self.form.unit
                 return TimeColumns(known[0], unit, None, None if spec.t_unit else self.form.tool, (*known[1:], None)[0])
-        if len(self.times) == 2:
-            (at, first), (then, second) = self.times
-            if re.sub("nano|n(?=sec)", "", second.stem) == first.stem and first.stem.endswith(
-                ("stamp_sec", "stamp_secs")
-            ):
-                return TimeColumns(at, "s", then)
+        if (parts := self._in_parts()) is not None and set(places) <= set(parts):
+            return TimeColumns(parts[0], "s", parts[1])
         if len(places) > 1:
             one, other = (self.names[place] for place in places[:2])
             raise RecordingError(
@@ -153,6 +149,18 @@ class Header:
         return self._timed(
             places[0], spec.t_unit or self.times[0][1].unit or ("s" if self.names[places[0]] == "t" else None)
         )
+
+    def _in_parts(self) -> tuple[int, int] | None:
+        """The columns of one clock's seconds and nanoseconds; None: there are none, or of more than one clock."""
+        words = [tuple(words_of(name)) or (name,) for name in self.names]
+        found = [
+            (k, words.index((*clock, of_nanoseconds)))
+            for k, (*clock, last) in enumerate(words)
+            if not clock or clock[-1] in CLOCKS
+            for of_nanoseconds in PARTS.get(last, ())
+            if (*clock, of_nanoseconds) in words
+        ]
+        return found[0] if len(found) == 1 else None
 
     def _timed(self, place: int, unit: str | None) -> TimeColumns:
         if place in self.dates:

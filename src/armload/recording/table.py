@@ -204,6 +204,11 @@ def _seconds(
         seconds, nanoseconds = table.whole_numbers(time.place), table.whole_numbers(time.nanoseconds)
         if seconds is None or nanoseconds is None:
             raise RecordingError(f"{where}: columns {name!r} and {table.names[time.nanoseconds]!r} hold broken numbers")
+        if len(nanoseconds) and (most := int(nanoseconds.max())) >= 1_000_000_000:
+            raise RecordingError(
+                f"{where}: column {table.names[time.nanoseconds]!r} holds {most}: expected fewer than 1e9 nanoseconds, "
+                f"beside the whole seconds of column {name!r}; name the one that holds the time with --columns t=…"
+            )
         return raw, seconds * 1_000_000_000 + nanoseconds, 1e-9
     if time.unit is None:
         with np.errstate(invalid="ignore"):  # numbers that are not finite are refused later, by their row
