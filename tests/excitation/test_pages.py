@@ -140,7 +140,7 @@ def test_in_how_many_worlds_a_motion_reaches_the_accuracy_is_what_was_measured()
 def test_what_the_quickest_ways_would_save_is_what_was_measured():
     arms = result("ways_to_start")["arms"]
     panda, ur = ([arms[name][way]["duration"] for way in ("ruckig", "quintic")] for name in ("panda", "ur10e"))
-    assert abs(panda[0] / panda[1] - 2 / 3) < 0.05
-    assert abs(ur[0] / ur[1] - 4 / 5) < 0.05
-    assert all(slow - quick < 1.0 for quick, slow in (panda, ur))  # [s], less than a second in the median
+    assert abs(panda[0] / panda[1] - 7 / 10) < 0.03
+    assert abs(ur[0] / ur[1] - 5 / 6) < 0.03
+    assert all(slow - quick < 0.5 for quick, slow in (panda, ur))  # [s], in the median
     assert all(set(found["one only"].values()) == {0} for found in arms.values())  # both ways or neither
