@@ -174,6 +174,13 @@ def test_a_session_of_several_logs_is_shown_with_all_their_names(folder, capsys,
     assert "one session does not tell how the arm drifts" in said.err
 
 
+def test_the_offsets_of_an_arm_of_small_servos_are_shown_with_two_digits(profile, capsys):
+    known = load_profile(profile)
+    small = [replace(one, offset=(0.0042, *[-0.0006] * (known.n - 1))) for one in known.sessions]
+    print_profile(replace(known, sessions=tuple(small)), motors=False)
+    assert "+0.0042 -0.0006 -0.0006" in capsys.readouterr().out
+
+
 def test_a_log_that_fits_less_well_than_an_arm_s_own_is_named(profile):
     known = load_profile(profile)
     assert not any("was it made by this arm?" in line for line in next_steps(known))

@@ -11,11 +11,12 @@ import armload
 from armload.app.cli.arguments import built_in_arms
 from armload.arms import ARMS, PAYLOAD_REACH, Arm, arm, facts_of, rated_effort, rated_mass, strength
 from armload.arms.facts import description_of, read_sheet
+from armload.arms.tellable import tellable
 from armload.devices import FORMS, Simulator, open_source
 from armload.devices.opening import SCHEMES
 from armload.errors import ArmError
 from armload.identification import identify
-from armload.inertia import InertialParameters
+from armload.inertia import NAMES, InertialParameters
 from armload.motion import excitation, random_motion
 from armload.motion.collision import capsule_arm
 from armload.payloads import draw_payload, hand_on
@@ -147,6 +148,27 @@ def test_a_horizontal_arm_does_not_determine_what_its_torques_do_not_hold(method
     assert abs(found.mass - body.mass) < 0.01
     assert found.determined[0]
     assert not found.determined[3:9].any()  # m·rz and the inertia about other axes than the joints'
+
+
+def test_what_no_motion_of_an_arm_determines_is_said_so_and_no_faster_motion_is_asked_for():
+    horizontal, names = horizontal_arm(), np.array(NAMES)
+    assert names[tellable(horizontal)].tolist() == ["m", "m·rx", "m·ry", "Izz"]
+    assert all(tellable(arm(name)).all() for name in ("panda", "ur10e"))
+    body = InertialParameters.from_com(5.0, (0.02, -0.03, 0.06), np.diag([0.02, 0.02, 0.02]))
+    log = simulate(horizontal, random_motion(horizontal, seed=1), body, rate=200.0)
+    notes = identify(log, horizontal).notes
+    assert any(note.startswith("no motion of this arm determines m·rz, Ixx, Ixy, Ixz, Iyy, Iyz:") for note in notes)
+    assert not any("move the wrist faster" in note or "this motion does not" in note for note in notes)
+
+
+def test_a_weighed_mass_that_the_joints_do_not_feel_is_not_called_nothing():
+    turntable = Arm("turntable", horizontal_arm().urdf, "link1")
+    assert np.array(NAMES)[tellable(turntable)].tolist() == ["Izz"]
+    body = InertialParameters.from_com(5.0, (0.02, -0.03, 0.06), np.diag([0.02, 0.02, 0.02]))
+    log = simulate(turntable, random_motion(turntable, seed=1), body, rate=200.0)
+    found = identify(log, turntable, mass=(5.0, 0.01))
+    assert found.mass == pytest.approx(5.0, abs=0.02)
+    assert found.why_not_held == "the log does not tell whether anything is held"
 
 
 def test_one_payload_is_assumed_of_an_unrated_arm_by_the_prior_and_the_simulator_alike():

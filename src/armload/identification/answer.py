@@ -165,7 +165,8 @@ class Identification:
         """Why `held` is false, in a sentence; "" where it is true."""
         if self.held:
             return ""
-        if not self.determined[0]:
+        far = self.phi[0] > HELD * np.sqrt(self.covariance[0, 0])  # as it was weighed: only the log tells what is held
+        if not self.determined[0] or far:
             return "the log does not tell whether anything is held"
         if self.phi_high[0] < 0:
             return "nothing is held: the mass is below zero"

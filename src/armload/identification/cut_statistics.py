@@ -40,7 +40,7 @@ from armload.posterior.solve import solve
 from armload.regression import JointFeatures, payload_prior_std, solution_prior_std
 from armload.regression.information import RegressionData
 from armload.regression.noise import SMOOTH, NoiseModel
-from armload.regression.prior import BODY_SIZES, body_root
+from armload.regression.prior import BODY_SIZES, body_root, payload_size
 from armload.regression.rows_of_log import RowsOfLog
 
 # of joint torque sensors: what is left of vibration looks like a change where it is taken to be less. What motor
@@ -129,8 +129,9 @@ class Cuts:
 
     def __init__(self, physics: SmoothPosteriorLeastSquares, rows: RowsOfLog, kappa: float, held: float = 0.0) -> None:
         self.physics, self.rows, self.kappa = physics, rows, kappa
-        self.weak, self.body = solution_prior_std(physics.arm), payload_prior_std(physics.arm)[0] * body_root()
-        loss = LOSS_DIFFERS * max(held, 0.0) if physics.arm.motor_torque else 0.0  # [kg]
+        arm = physics.arm
+        self.weak, self.body = solution_prior_std(arm), payload_prior_std(arm)[0] * body_root(payload_size(arm))
+        loss = LOSS_DIFFERS * max(held, 0.0) if arm.motor_torque else 0.0  # [kg]
         self.lost = np.diag((loss * self.weak / self.weak[0]) ** 2)
         known = _without_payload(physics.stream.tares, physics.arm, physics.start)
         self.few = replace(physics.features, pose=min(_FEW, physics.features.pose))

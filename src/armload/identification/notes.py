@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm
+from armload.arms.tellable import tellable
 from armload.arms.units import unit_of
 from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
@@ -93,7 +94,13 @@ def lacking(
         notes.append(
             f"record a tare: the figures of this arm's links are nominal, and their errors count as payload ({RECORD})"
         )
-    missing = ~determined
+    never = ~determined & ~tellable(arm)
+    if never.any():
+        notes.append(
+            f"no motion of this arm determines {_names(never)}: its joints do not feel them, or not each by itself; "
+            "what was known before is reported for them; say what else is known of the payload (--mass, --com, --body)"
+        )
+    missing = ~determined & ~never
     if known_arm_std is None or tared:
         if missing.any():
             notes.append(

@@ -50,7 +50,7 @@ from armload.identification.thresholds import (
 )
 from armload.recording import Recording
 from armload.recording.windows import Windows, integrals, windows
-from armload.regression.prior import within_reach
+from armload.regression.prior import payload_size, within_reach
 
 _MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
 # as many as a log of six seconds has: for where many accounts of a log are compared, as all pairs of joints exchanged
@@ -190,7 +190,10 @@ class _System(NamedTuple):
         offset = np.broadcast_to(np.eye(n), (W, n, n))
         level = friction[:, :, None] * np.eye(n)
         mass = HEAVIEST * rated_mass(arm)
-        columns, prior = [payload, offset, level], [within_reach(mass), OFFSET * rated, FRICTION * rated]
+        columns, prior = (
+            [payload, offset, level],
+            [within_reach(mass, payload_size(arm)), OFFSET * rated, FRICTION * rated],
+        )
         if gears:
             columns += [x[:, :, None] * np.eye(n) for x in _changes(recording, parts)]
             prior += [_VISCOUS * rated, _ROTOR * rated]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm
+from armload.arms import Arm, rated_effort
 from armload.arms.units import unit_of
 from armload.identification.thresholds import DEGREES_FROM, EFFORT
 from armload.recording import GAP, TURN, Sample, endless
@@ -38,6 +38,9 @@ _NOTHING, _NOT_FINITE, _IMPLAUSIBLE, _REPEATED, _LATE, _JUMPED = range(6)  # int
 _SLACK_POSITION = 0.5  # [rad] beyond a joint's limits
 _TIMES_VELOCITY = 3.0  # times a joint's limit: a single sample may be a spike of a differentiated encoder
 _ANY_VELOCITY, _ANY_EFFORT = 50.0, 1e4  # [rad/s], [N·m] where limits are unknown: ten times the catalogue's and more
+# times what a joint without a limit is taken to be built for, if that is more: makers' limits are up to 5.6 times that
+# (`arms.strength`), and `EFFORT` times one may be seen (test_a_strong_arm_without_limits_has_its_samples_listened_to)
+_TIMES_EFFORT = 20.0
 # [rad] and, times the largest velocity, what a joint may move between two samples: stamps jitter by milliseconds
 # (test_swapped_joints_are_left_out). Compiled code holds most of these: change them in this file
 _JUMP, _JUMP_TIMES = 0.05, 1.5
@@ -93,7 +96,7 @@ class Gate:
                 limits.position_low - _SLACK_POSITION,
                 limits.position_high + _SLACK_POSITION,
                 np.where(known, _TIMES_VELOCITY * limits.velocity, _ANY_VELOCITY),
-                np.where(bounded, EFFORT * limits.effort, _ANY_EFFORT),
+                np.where(bounded, EFFORT * limits.effort, np.maximum(_ANY_EFFORT, _TIMES_EFFORT * rated_effort(arm))),
                 np.where(known, _JUMP_TIMES * limits.velocity, _ANY_VELOCITY),
             ]
         )

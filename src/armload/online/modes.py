@@ -61,7 +61,8 @@ class Modes:
     """The probabilities of what the last rows are.
 
     Args:
-        mass: of a payload as the arm usually holds [kg]. effort: torque scale of each joint (n,) [N·m].
+        mass: of a payload as the arm usually holds [kg]. effort: torque scale of each joint (n,) [N·m]. larger:
+            times that what it holds is larger than what the built-in arms do (`payload_size`).
 
     Attributes:
         steady: probability that the arm holds what it held, and nothing else pulls at it; drifting or not.
@@ -70,9 +71,9 @@ class Modes:
             there [s]. taken_off: of `contact`, that part of what was on the arm from the start is off instead.
     """
 
-    def __init__(self, mass: float, effort: NDArray[np.float64]) -> None:
+    def __init__(self, mass: float, effort: NDArray[np.float64], larger: float = 1.0) -> None:
         n, bodies, starts = len(effort), _BODIES, len(STARTS)
-        self.root, self.effort = mass * body_root(), effort
+        self.root, self.effort = mass * body_root(larger), effort
         # what is handed to compiled code comes in few arrays: each costs as much as a hundred products
         self._pushes = np.array([[DRIFT_SIZE, *PUSH_SIZES], [DRIFT_TIME, *(CONTACT_TIME for _ in PUSH_SIZES)]])
         force = 9.81 * mass * HAND_SIZES  # (K,) [N]

@@ -31,6 +31,7 @@ from armload.posterior import PosteriorLeastSquares
 from armload.posterior.sequential import SequentialPosterior
 from armload.recording import GAP, Sample
 from armload.regression import payload_prior_std
+from armload.regression.prior import payload_size
 from armload.regression.row_kernels import STILL
 from armload.regression.rows import Row
 
@@ -52,7 +53,7 @@ class Weighing:
 
     def reset(self, run: PosteriorLeastSquares) -> None:
         """Forget the stream; the next row is the first of a run."""
-        self.modes = Modes(self._unit, run.stream.correction.effort)
+        self.modes = Modes(self._unit, run.stream.correction.effort, payload_size(run.arm))
         self._motor = False  # whether its torque is measured at the motors
         self._sticking = Sticking(len(run.stream.correction.effort))  # of joints behind whose gears it is measured
         # Coulomb friction (n,) [N·m], as of the last row taken: a run that ends is solved anew beside

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,7 +81,7 @@ def print_profile(profile: Profile, motors: bool, arm: Arm | None = None) -> Non
     torque = heading("torque", slides).removeprefix("torque ")
     rows = table(f"from session to session, 1 sigma {torque}", "", *(f"joint {j + 1}" for j in range(n)))
     for name, values in (("offset", drift[0]), ("Coulomb friction", drift[1])):
-        rows.add_row(name, *(f"{x:.3f}" for x in values))
+        rows.add_row(name, *(f"{x:.{decimals(values, 3)}f}" for x in values))
     if profile.gain is not None and profile.gain_std is not None:
         rows.add_row("torque sensor's gain", *(f"{1.0 + x:.3f}" for x in profile.gain))
         if profile.gain_joint_std is not None:
@@ -87,8 +89,9 @@ def print_profile(profile: Profile, motors: bool, arm: Arm | None = None) -> Non
         print(f"a known weight was hung on: the torque is known to {100 * profile.gain_std:.1f} %")
     console().print(rows)
     rows = table("sessions", "log", "time [s]", f"offsets {torque}", "misfit", "noise")
+    digits = decimals([x for session in profile.sessions for x in session.offset], 2)
     for session in profile.sessions:
-        offsets = " ".join(f"{x:+.2f}" for x in session.offset)
+        offsets = " ".join(f"{x:+.{digits}f}" for x in session.offset)
         name, time = _name(session), f"{session.duration:.0f}"
         rows.add_row(name, time, offsets, f"{session.statistic:.0f}", f"{max(session.noise):.1f}")
     console().print(rows)
@@ -105,6 +108,16 @@ def print_profile(profile: Profile, motors: bool, arm: Arm | None = None) -> Non
         print_note(_OF_MOTORS)
     for line in next_steps(profile, arm):
         print_note(line)
+
+
+def decimals(values: Iterable[float], least: int) -> int:
+    """How many show two digits of the largest value, as of an arm of small servos; at least so many.
+
+    >>> decimals([-0.0042, 0.0006], 2), decimals([3.0, 0.1], 2)
+    (4, 2)
+    """
+    largest = max(map(abs, values), default=0.0)
+    return least if largest == 0.0 else max(least, 1 - floor(log10(largest)))
 
 
 def _name(session: SessionRecord) -> str:
