@@ -126,7 +126,7 @@ class Detached(Source):
             self.close()
             raise
         self.name, self.n, self.rate, self.speed = event["name"], event["n"], event["rate"], event["speed"]
-        self.notes = tuple(event["notes"])
+        self.notes, self.epoch = tuple(event["notes"]), event["epoch"]
 
     @property
     def process(self) -> subprocess.Popen[bytes]:

@@ -114,9 +114,11 @@ class Recording:
         late = np.flatnonzero(self.t[1:] <= self.t[:-1])
         if len(late):
             k = int(late[0])
+            back = self.t[k + 1] < self.t[k]
+            do = "sort it, or cut it where its clock was set" if back else "drop repeated rows, or keep more digits"
             raise RecordingError(
                 f"{self.source}: time goes from {self.t[k]:.6f} s to {self.t[k + 1]:.6f} s at row {k + 1}: expected "
-                "strictly increasing times; sort the log or drop repeated rows"
+                f"strictly increasing times; {do}"
             )
 
     def __repr__(self) -> str:
