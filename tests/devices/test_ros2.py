@@ -109,6 +109,15 @@ def test_efforts_that_are_currents_or_lack_gravity_become_torque(tmp_path):
             assert np.allclose(states.sample(message, 0).tau, tau, atol=1e-9)
 
 
+@pytest.mark.parametrize(("stamp", "simulated"), [(0, False), (12 * SECOND, True), (1_790_000_000 * SECOND, False)])
+def test_stamps_that_show_no_time_of_day_are_of_simulated_time(panda, stamp, simulated):
+    """It runs slower or faster than time does; messages without stamps are timed when they come."""
+    states = JointStates(panda, "/joint_states")
+    assert not states.simulated
+    states.sample(joint_state(panda.joint_names, *np.ones((3, 7)), stamp), 1_790_000_000 * SECOND)
+    assert states.simulated == simulated
+
+
 def test_a_message_of_another_device_is_no_sample(panda):
     states = JointStates(panda, "/joint_states")
     assert states.sample(joint_state(["finger"], [0.0], [0.0], [0.0], SECOND), 0) is None

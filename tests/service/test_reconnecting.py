@@ -178,6 +178,36 @@ def test_samples_that_waited_on_their_way_are_as_old_as_they_waited():
     assert np.allclose(late, arrived - t, atol=1e-9)
 
 
+@pytest.mark.parametrize("paced", [True, False])
+def test_simulated_time_that_runs_slower_than_time_does_makes_no_sample_old(panda, path, paced):
+    class Slower(Detached):
+        """Each sample comes a tenth of a second later than its clock says."""
+
+        count = 0
+
+        def arrived(self):
+            return 1e3 + 0.1 * self.count
+
+    made = []
+
+    def opened():
+        made.append(Slower(str(path), panda, loop=True))
+        made[0].paced = paced
+        return made[0]
+
+    source = Reconnecting(opened, name="arm", n=7)
+    try:
+        for sample in source.ticking(0.05):
+            if sample is not None:
+                late = made[0].arrived() - source.arrived()
+                made[0].count += 1
+            if made and made[0].count == 10:
+                break
+        assert late == pytest.approx(0.9 if paced else 0.0, abs=0.1)
+    finally:
+        source.close()
+
+
 def test_a_clock_set_back_by_100_s_is_no_silence(panda, analytic_log):
     log = analytic_log(panda, duration=4.0, start=200.0)
     identifier = OnlineIdentifier(panda, method="map")

@@ -1,7 +1,9 @@
 """How long a sample was on its way to this machine, beyond the shortest way there was lately.
 
 Nobody knows the robot's clock, but arrival − t has a floor: the shortest way plus what the clocks differ by. What a
-sample is above the floor of the last minute it has waited, in a network or in a reader that got no processor.
+sample is above the floor of the last minute it has waited, in a network or in a reader that got no processor. That
+holds of clocks that run as fast as this machine's (`Source.paced`): simulated time that runs slower would look later
+and later.
 """
 
 from __future__ import annotations

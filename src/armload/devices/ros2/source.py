@@ -72,6 +72,7 @@ class Ros2Source(Source):
             if rate is None:
                 self.rate = self._measured_rate()
                 self._check_rate()
+            self.paced = not self._states.simulated
         except BaseException:
             self.close()
             raise
