@@ -24,15 +24,18 @@ class Transit:
 
     def __init__(self) -> None:
         self._floor = self._before = math.inf
-        self._began = self._last = -math.inf
+        self._began = self._newest = -math.inf
+        self._behind = math.inf  # time of the sample before, if it was older than the newest
 
     def late(self, t: float, arrived: float) -> float:
         """How late a sample arrived [s]; t: its own time, arrived: on this machine's monotonic clock [s]."""
         if not math.isfinite(t):
             return 0.0
-        if t < self._last - _SET:
+        older = t < self._newest
+        if t < self._newest - _SET or (older and t > self._behind):  # two running: a clock that was set, as in a record
             self.__init__()
-        self._last = t
+        self._behind = t if older else math.inf
+        self._newest = max(self._newest, t)
         if arrived - self._began > _WINDOW:
             self._before, self._floor, self._began = self._floor, math.inf, arrived
         self._floor = min(self._floor, arrived - t)
