@@ -1,6 +1,7 @@
 """Shared fixtures: the arms, and the folder of real logs where there is one."""
 
 import os
+import time
 from pathlib import Path
 
 import numpy as np
@@ -91,6 +92,16 @@ def real_data() -> Path:
     if not (folder / "panda_unloaded_1khz.csv").exists():
         pytest.skip(f"real logs not found in {folder}: set ARMLOAD_REAL_DATA to their folder")
     return folder
+
+
+@pytest.fixture
+def far_east(monkeypatch):
+    """A machine whose local time is fourteen hours ahead of UTC."""
+    monkeypatch.setenv("TZ", "XXX-14")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import signal
 import threading
 import time
 from dataclasses import replace
+from datetime import UTC, datetime
 from types import SimpleNamespace
 
 import numpy as np
@@ -345,14 +346,18 @@ def test_what_is_added_while_a_stream_s_own_is_learned_is_kept(folder, long, pro
     assert names == ["day0.csv", "day1.csv", "day2.csv", "day3.csv", "long.csv"]
 
 
-def test_sessions_of_one_robot_s_streams_are_told_apart_by_when_they_were(profile, tmp_path, capsys):
+@pytest.mark.usefixtures("far_east")
+def test_sessions_of_one_robot_s_streams_are_told_apart_by_when_they_were_in_utc(profile, tmp_path, capsys):
     path, known = tmp_path / "arm.profile", load_profile(profile)
     named = SimpleNamespace(learned=lambda name, now: replace(now, sessions=(replace(known.sessions[0], name=name),)))
     path.write_bytes(profile.read_bytes())
+    began = datetime.now(UTC).replace(second=0, microsecond=0)
     learn_from(SimpleNamespace(source=SimpleNamespace(name="panda://10.0.0.2"), identifier=named), str(path))
     capsys.readouterr()
     assert main(["profile", "show", str(path)]) == 0
-    assert re.search(r"10\.0\.0\.2 20\d\d-\d\d-\d\d \d\d:\d\d", capsys.readouterr().out)
+    found = re.search(r"10\.0\.0\.2 (20\d\d-\d\d-\d\d \d\d:\d\d) UTC", capsys.readouterr().out)
+    assert found is not None
+    assert began <= datetime.fromisoformat(found[1]).replace(tzinfo=UTC) <= datetime.now(UTC)
 
 
 @pytest.mark.full  # some seconds

@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 
 from armload.app.cli import main
 from armload.arms import arm
+from armload.errors import ArmloadError
 from armload.identification import identify
 from armload.motion import FourierMotion, load_motion, save_motion, taie2024
 from armload.payloads import test_payload as held_payload
@@ -149,6 +151,23 @@ def test_without_a_motion_one_about_the_present_pose_is_designed(tmp_path, monke
     said = json.loads(capsys.readouterr().out)
     assert [move["purpose"] for move in said["movements"]] == ["without the payload", "with the payload"]
     assert [move["motion"] for move in said["movements"]] == ["designed", "designed"]
+
+
+@pytest.mark.usefixtures("far_east")
+def test_a_folder_that_nobody_named_is_called_by_the_time_in_utc(motion, tmp_path, monkeypatch):
+    """Local time goes through one hour twice a year, and is another where the logs are read."""
+    monkeypatch.chdir(tmp_path)
+    folders = []
+
+    def begun(*given, **_):
+        folders.append(given[3])
+        raise ArmloadError("enough")
+
+    monkeypatch.setattr("armload.measuring.Procedure", begun)
+    began = datetime.now(UTC).replace(microsecond=0)
+    assert main(["measure", "sim", *QUICK, "--motion", motion, "--dry-run"]) == 2
+    when = datetime.strptime(folders[0], "measurement-%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
+    assert began <= when <= datetime.now(UTC)
 
 
 @pytest.mark.parametrize(

@@ -226,16 +226,18 @@ def test_torque_of_the_wrong_sign_does_not_fit_and_is_said_once(panda, analytic_
 
 
 def test_the_age_of_a_tare_is_counted_from_when_it_was_taken_or_recorded(panda, analytic_log, monkeypatch):
-    log = replace(analytic_log(panda, duration=4.0), source="empty.csv", epoch=1e9)
+    log = replace(analytic_log(panda, duration=4.0), source="empty.csv", epoch=1.7e9)
     session = Session(simulated(panda, duration=8.0), panda, tare=log, method="map")
     watcher = Watcher(session)
     now = monotonic()
-    monkeypatch.setattr("time.time", lambda: 1e9 + float(log.t[-1]) + 600.0)
+    monkeypatch.setattr("time.time", lambda: 1.7e9 + float(log.t[-1]) + 600.0)
     monkeypatch.setattr("time.monotonic", lambda: now)
     assert watcher.look().tare == "empty.csv, 10 min old"
     for tare, words in (
         (Tare(log, age=7200.0, given=now - 1.0), "empty.csv, 2 h old"),  # as somebody said
         (Tare(log, taken=True, given=now - 15.0), "taken 15.0 s ago"),
+        (Tare(replace(log, epoch=0.0, t=1.7e9 + log.t), given=now), "empty.csv, 10 min old"),  # times since 1970
+        (Tare(replace(log, epoch=5e3), given=now), "empty.csv, which does not say when it was recorded"),  # since boot
         (Tare(replace(log, epoch=0.0), given=now), "empty.csv, which does not say when it was recorded"),
     ):
         session.tare = tare

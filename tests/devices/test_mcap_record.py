@@ -15,11 +15,11 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader
 
 from armload.app.cli import main
-from armload.devices import Recorder
+from armload.devices import Recorded, Recorder, Replay, Steadied, open_source
 from armload.devices.mcap_part import DIAGNOSTICS, JOINT_STATES, LOG, PARAMETERS, PAYLOAD, TOPICS
 from armload.errors import RecordingError
 from armload.inertia import phi_to_com
-from armload.recording import Sample, read_long, read_recording, write_recording
+from armload.recording import Recording, Sample, read_long, read_recording, write_recording
 from armload.recording.mcap_file import CHUNK_BYTES
 
 LIMIT = 120.0  # [s] for a process of a test
@@ -36,6 +36,11 @@ def decoded(path):
 
 def table(log):
     return np.column_stack([log.q, log.dq, log.tau])
+
+
+def dated(log, began):
+    """The arrays of a log that began then [s since 1970]."""
+    return {"t": log.t - log.t[0] + began, "q": log.q, "dq": log.dq, "tau": log.tau}
 
 
 def samples(count, n=7, seed=0):
@@ -138,6 +143,44 @@ def test_a_record_keeps_every_sample_as_csv_does(tmp_path, panda):
     assert logs[1].notes == ()
 
 
+@pytest.mark.parametrize(
+    ("t", "epoch", "date"),
+    [(1.7e9, 0.0, 1.7e9), (0.0, 1.7e9, 1.7e9), (-3.0, 1.7e9, 1.7e9 - 3.0), (5000.0, 0.0, None), (-3.0, 0.0, None)],
+    ids=["since 1970", "counted", "before", "since boot", "negative"],
+)
+def test_the_record_of_a_replay_has_the_log_s_own_date_and_not_that_of_the_replay(tmp_path, panda, t, epoch, date):
+    """Else an old tare that was replayed would be one of today, and four days' logs one session of a profile."""
+    rows = samples(2000)
+    q, dq, tau = (np.array([sample[k] for sample in rows]) for k in (1, 2, 3))
+    log = Recording(t + np.arange(2000) / 100.0, q, dq, tau, epoch=epoch)
+    with Replay(log, speed=None) as source, Recorder(tmp_path / "a.mcap", 7, panda.joint_names, source.epoch) as kept:
+        kept.say("before any sample")
+        for sample in source:
+            kept.append(sample)
+    with Recorded(Replay(log, speed=None), tmp_path / "b.mcap", panda.joint_names) as source:
+        assert source.epoch == Steadied(Replay(log)).epoch
+        for _ in source:
+            pass
+    for name in ("a.mcap", "b.mcap"):
+        read = read_recording(tmp_path / name, panda)
+        assert read.date == (None if date is None else pytest.approx(date, abs=1e-6))
+        np.testing.assert_allclose(read.t, log.t - log.t[0], rtol=0, atol=1e-6)
+        assert read.epoch == pytest.approx(date or 0.0, abs=1e-6)
+    ((stamp, said),) = decoded(tmp_path / "a.mcap")[LOG]
+    assert said.msg == "before any sample"
+    assert stamp * 1e-9 == pytest.approx(date or 0.0, abs=1e-6)
+
+
+def test_a_log_that_is_replayed_in_a_process_of_its_own_keeps_its_date(tmp_path, panda, analytic_log):
+    np.savez(tmp_path / "run.npz", **dated(analytic_log(panda, duration=1.0), 1.7e9))
+    with open_source(str(tmp_path / "run.npz"), panda, detached=True) as source:
+        assert source.epoch == 0.0
+        first = next(iter(source))
+    assert first.t == 1.7e9
+    with open_source("sim", panda, speed=None, duration=0.1) as source:
+        assert source.epoch is None
+
+
 def test_a_clock_that_starts_anew_starts_a_new_part(tmp_path, panda):
     with Recorder(tmp_path / "run.mcap", 7, panda.joint_names) as recorder:
         for sample in [*samples(3), *samples(4)]:
@@ -220,7 +263,7 @@ def test_a_full_disk_is_said_and_leaves_whole_chunks(tmp_path, panda):
     code = """
 import resource, signal, sys
 import numpy as np
-from armload.devices import Recorder
+from armload.devices import Recorded, Recorder, Replay, Steadied, open_source
 from armload.errors import RecordingError
 from armload.recording import Sample
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

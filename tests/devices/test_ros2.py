@@ -27,6 +27,7 @@ from armload.devices.ros2 import (
 )
 from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.joint_states import JointStates
+from armload.devices.ros2.receipt import Receipt
 from armload.errors import MotionError, SourceError
 from armload.estimators import Estimate
 from armload.inertia import InertialParameters, is_consistent, to_order
@@ -107,6 +108,28 @@ def test_efforts_that_are_currents_or_lack_gravity_become_torque(tmp_path):
             states = JointStates(robot, "/joint_states", Effort(robot, **how))
             message = joint_state(ur.joint_names[::-1], q[::-1], dq[::-1], sent[::-1], SECOND)
             assert np.allclose(states.sample(message, 0).tau, tau, atol=1e-9)
+
+
+@pytest.mark.parametrize(("stamp", "simulated"), [(0, False), (12 * SECOND, True), (1_790_000_000 * SECOND, False)])
+def test_stamps_that_show_no_time_of_day_are_of_simulated_time(panda, stamp, simulated):
+    """It runs slower or faster than time does; messages without stamps are timed when they come."""
+    states = JointStates(panda, "/joint_states")
+    assert not states.simulated
+    states.sample(joint_state(panda.joint_names, *np.ones((3, 7)), stamp), 1_790_000_000 * SECOND)
+    assert states.simulated == simulated
+
+
+@pytest.mark.parametrize("step", [-3600.0, -0.5, 0.5, 3600.0])
+def test_a_clock_that_is_set_while_messages_wait_makes_none_of_them_old(step):
+    """Messages wait for 20 ms each; one that came just after the clock of this machine was set may seem younger."""
+    receipt, set_at = Receipt(), 2.0
+    for k in range(400):
+        came, taken = 0.01 * k, 0.01 * k + 0.02
+        received, wall = (round(1e9 * (1.79e9 + t + step * (t > set_at))) for t in (came, taken))
+        waited = receipt.waited(received, wall, round(1e9 * taken))
+        assert -1e-6 <= waited <= 0.02 + 1e-6
+        assert abs(taken - set_at) < 0.05 or waited == pytest.approx(0.02, abs=1e-6)
+    assert receipt.waited(0, wall, round(1e9 * taken)) == 0.0
 
 
 def test_a_message_of_another_device_is_no_sample(panda):

@@ -257,7 +257,7 @@ def test_of_joint_sensors_a_tare_is_confirmed_and_nothing_is_assumed(answer):
 def test_a_pause_of_a_log_is_said(panda, loaded, plain):
     later = loaded.t + 3600.0 * (np.arange(len(loaded)) >= len(loaded) // 2)
     found = identify(replace(loaded, t=later), panda)
-    assert any(note.startswith("the log pauses for 3600.0 s, 3.1 s after") for note in found.notes)
+    assert any(note.startswith("the log pauses for 60min, 3.1 s after") for note in found.notes)
     assert not any("pauses" in note for note in plain.notes)
 
 

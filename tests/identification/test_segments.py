@@ -258,7 +258,10 @@ def test_clocks_that_show_the_time_of_day_tell_the_age_and_others_do_not(panda):
     assert drift_since(tare, log, DAY) == (1.0, ())
 
 
-@pytest.mark.parametrize(("seconds", "words"), [(90.0, "1.5min"), (7200.0, "2h"), (3 * DAY, "3d")])
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(90.0, "1.5min"), (7200.0, "2h"), (3 * DAY, "3d"), (1230 * DAY, "1230d"), (1e6 * DAY, "1000000d")],
+)
 def test_an_age_is_said_as_it_can_be_given(seconds, words):
     from armload.app.cli.arguments import duration
 

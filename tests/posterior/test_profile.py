@@ -373,6 +373,13 @@ def test_logs_within_an_hour_are_of_one_session(life):
     assert by_clock(counted)[:3] == [0, 0, 2]
 
 
+def test_a_log_within_a_longer_one_does_not_end_its_session(life):
+    """Two records of one arm, of which one ends long before the other."""
+    long = replace(life[1][0], t=1.7e9 + np.linspace(0.0, 3 * 3600.0, len(life[1][0])))
+    short, later = (replace(life[1][1], t=1.7e9 + after + life[1][1].t) for after in (60.0, 3.5 * 3600.0))
+    assert by_clock([long, short, later]) == [0, 0, 0]
+
+
 def test_a_profile_needs_a_log(panda):
     with pytest.raises(ArmloadError, match="at least one log"):
         learn_profile(panda, [])

@@ -1,5 +1,6 @@
 """Logs whose times are dates: the same samples, and the day they were recorded."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -71,6 +72,7 @@ def test_an_archive_may_hold_dates(tmp_path):
     q, dq, tau = np.split(VALUES, 3, axis=1)
     np.savez(tmp_path / "log.npz", t=(START + STEPS).astype("datetime64[ns]"), q=q, dq=dq, tau=tau)
     check(read_recording(tmp_path / "log.npz", columns="t=t"))
+    check(read_recording(tmp_path / "log.npz"))
 
 
 def test_the_index_of_a_data_frame_is_time_if_it_holds_dates(tmp_path):
@@ -93,12 +95,46 @@ def test_a_column_of_dates_does_not_displace_a_column_of_time(tmp_path):
         ([*iso(START + STEPS[:-1]), "7.5"], None, r"time' holds dates in some rows only: expected one in every row"),
         (iso(START + STEPS[::-1]), None, r"line 3: t = -.* goes back in time"),
         (["2026-13-02 13:05:09"] * 30, None, r"line 2: time is '2026-13-02 13:05:09': expected a number"),
+        (
+            iso(START + STEPS[::-1]),
+            None,
+            r"; sort rows out of order, or cut the log where its clock was set$",
+        ),
+        (iso(START + STEPS, digits=2), None, r"line 3: t = .* repeats the time of line 2 .*; write them with more dig"),
+        (["13:05:09.5"] * 30, None, r"time is '13:05:09.5': expected a number, or a date of the years 1678 to 2261"),
+        (["20260302T130509Z"] * 30, None, r"expected a number, or a date .* such as 2026-03-02T14:05:09.123Z$"),
+        (
+            [f"2262{cell[4:]}" for cell in iso(START + STEPS)],
+            None,
+            r"'2262-03-02T.*': .* of the years 1678 to 2261",
+        ),
+        (
+            [f"1677{cell[4:]}" for cell in iso(START + STEPS)],
+            None,
+            r"'1677-03-02T.*': .* of the years 1678 to 2261",
+        ),
     ],
-    ids=["unit", "text", "number", "backwards", "month 13"],
+    ids=["unit", "text", "number", "backwards", "month 13", "set", "digits", "hours", "basic", "2262", "1677"],
 )
 def test_dates_that_make_no_sense_are_refused_by_their_place(tmp_path, cells, columns, says):
     with pytest.raises(RecordingError, match=says):
         read_recording(csv(tmp_path / "log.csv", cells), columns=columns)
+
+
+@pytest.mark.parametrize("year", ["1677", "2262", "9026"])
+def test_dates_that_nanoseconds_in_64_bits_do_not_hold_are_refused_and_not_wrapped(tmp_path, year):
+    times = np.array([f"{year}{cell[4:]}" for cell in iso(START + STEPS, digits=6)], dtype="datetime64[us]")
+    q, dq, tau = np.split(VALUES, 3, axis=1)
+    np.savez(tmp_path / "log.npz", time=times, q=q, dq=dq, tau=tau)
+    with pytest.raises(RecordingError, match=rf"column time, row 0, is {year}-03-02T.*: expected a date of"):
+        read_recording(tmp_path / "log.npz")
+
+
+@pytest.mark.parametrize(("year", "seconds"), [("1678", -9209328890.9), ("2261", 9188341509.1)])
+def test_dates_of_the_first_and_the_last_year_are_times(tmp_path, year, seconds):
+    log = read_recording(csv(tmp_path / "log.csv", [f"{year}{cell[4:]}" for cell in iso(START + STEPS)]))
+    np.testing.assert_allclose(log.t, (STEPS - STEPS[0]) * 1e-9, rtol=0, atol=1e-9)
+    assert log.epoch == pytest.approx(seconds, abs=0.1)
 
 
 @pytest.mark.parametrize(("began", "dated"), [(0.0, False), (1.79e9, True), (2.53e11, True), (2.54e11, False)])
@@ -122,4 +158,7 @@ def test_dates_tell_the_age_of_a_tare(tmp_path):
     assert seconds == pytest.approx(4 * DAY - tare.duration, abs=1.0)
     assert told == said
     assert age_of(tare, log.date, DAY) == (DAY, ())
+    before, (told,) = age_of(replace(tare, epoch=tare.epoch + 8 * DAY), log.date, None)
+    assert before == pytest.approx(4 * DAY, abs=1.0)  # by a clock that is wrong, or of a log that came before its tare
+    assert told.startswith("by the logs' clocks the tare was recorded 4d after what it is the tare of:")
     assert age_of(tare, None, None) == age_of(None, log.date, None) == (0.0, ())

@@ -171,11 +171,58 @@ def test_a_clock_that_is_set_makes_no_sample_old(step):
     assert max(late) < 1e-9
 
 
+@pytest.mark.parametrize("step", [-0.1, -0.7, -0.99])
+def test_a_clock_that_is_set_back_by_less_than_a_second_makes_one_sample_old(step):
+    transit, wall = Transit(), 0.01 * np.arange(400)
+    own = wall + np.where(wall > 2.0, step, 0.0)
+    late = np.array([transit.late(t, arrived + 50.0) for t, arrived in zip(own, wall, strict=True)])
+    assert np.sum(late > 1e-9) == 1
+
+
+def test_a_sample_that_overtook_others_sets_no_clock():
+    transit, t = Transit(), 0.01 * np.arange(400)
+    order = np.arange(400)
+    order[100], order[101] = 101, 100
+    for own in t[order][:200]:
+        transit.late(own, own + 50.0)
+    assert transit.late(t[200], t[200] + 50.6) == pytest.approx(0.6)
+
+
 def test_samples_that_waited_on_their_way_are_as_old_as_they_waited():
     transit, t = Transit(), 0.01 * np.arange(400)
     arrived = np.where((t > 1.0) & (t < 1.7), 1.7, t)  # seven tenths come at once
     late = [transit.late(*pair) for pair in zip(t, arrived, strict=True)]
     assert np.allclose(late, arrived - t, atol=1e-9)
+
+
+@pytest.mark.parametrize("paced", [True, False])
+def test_simulated_time_that_runs_slower_than_time_does_makes_no_sample_old(panda, path, paced):
+    class Slower(Detached):
+        """Each sample comes a tenth of a second later than its clock says."""
+
+        count = 0
+
+        def arrived(self):
+            return 1e3 + 0.1 * self.count
+
+    made = []
+
+    def opened():
+        made.append(Slower(str(path), panda, loop=True))
+        made[0].paced = paced
+        return made[0]
+
+    source = Reconnecting(opened, name="arm", n=7)
+    try:
+        for sample in source.ticking(0.05):
+            if sample is not None:
+                late = made[0].arrived() - source.arrived()
+                made[0].count += 1
+            if made and made[0].count == 10:
+                break
+        assert late == pytest.approx(0.9 if paced else 0.0, abs=0.1)
+    finally:
+        source.close()
 
 
 def test_a_clock_set_back_by_100_s_is_no_silence(panda, analytic_log):

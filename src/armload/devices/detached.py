@@ -126,7 +126,7 @@ class Detached(Source):
             self.close()
             raise
         self.name, self.n, self.rate, self.speed = event["name"], event["n"], event["rate"], event["speed"]
-        self.notes = tuple(event["notes"])
+        self.notes, self.epoch, self.paced = tuple(event["notes"]), event["epoch"], event["paced"]
 
     @property
     def process(self) -> subprocess.Popen[bytes]:

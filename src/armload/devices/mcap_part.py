@@ -46,27 +46,31 @@ class McapPart:
     """One file of a record; see `Recorder`.
 
     Args:
-        path: to write. joint_names: of the arm.
+        path: to write. joint_names: of the arm. epoch: of the source (`Source.epoch`); None: samples are of now.
 
     Raises:
         RecordingError: it cannot be written.
     """
 
-    def __init__(self, path: Path, joint_names: Sequence[str]) -> None:
+    def __init__(self, path: Path, joint_names: Sequence[str], epoch: float | None = None) -> None:
         self._file = McapFile(path, TOPICS)
         self._names = list(joint_names)
         self._first: float | None = None
+        self._of_log = epoch
         self._epoch = self._now = 0  # [ns]
+        self._said: list[tuple[str, bool]] = []  # of a log, before its first sample told the time
 
     def append(self, row: list[float]) -> None:
         """A sample: t, q, dq, tau."""
         if self._first is None:
-            self._first, self._epoch = row[0], time.time_ns()
+            self._first = row[0]
+            self._epoch = time.time_ns() if self._of_log is None else round(1e9 * (self._of_log + row[0]))
         self._now, n = self._stamp(row[0]), len(self._names)
         q, dq, tau = np.array(row[1:]).reshape(3, n)
         header = _header(self._now)
         message = SimpleNamespace(header=header, name=self._names, position=q, velocity=dq, effort=tau)
         self._file.write(JOINT_STATES, self._now, message)
+        self._say_all()
 
     def keep(self, estimate: OnlineEstimate) -> None:
         """What is said of the payload after the newest sample."""
@@ -93,14 +97,24 @@ class McapPart:
 
     def say(self, text: str, warning: bool = False) -> None:
         """Something that happened."""
+        if self._first is None and self._of_log is not None:
+            self._said.append((text, warning))
+            return
         if self._first is None:
             self._now = time.time_ns()
         log = SimpleNamespace(stamp=_time(self._now), level=_WARN if warning else _INFO, name="armload", msg=text)
         self._file.write(LOG, self._now, SimpleNamespace(**vars(log), file="", function="", line=0))
 
     def close(self) -> None:
-        """Write the index."""
+        """Write what was said without a sample, and the index."""
+        self._of_log = None
+        self._say_all()
         self._file.close()
+
+    def _say_all(self) -> None:
+        said, self._said = self._said, []
+        for text, warning in said:
+            self.say(text, warning)
 
     def _stamp(self, t: float) -> int:
         assert self._first is not None

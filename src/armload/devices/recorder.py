@@ -41,7 +41,7 @@ class Recorder:
     Args:
         path: a `.csv` or `.mcap` file that does not exist yet, nor what may come beside it: nothing is ever written
             over.
-        n: joints. joint_names: of an MCAP.
+        n: joints. joint_names: of an MCAP. epoch: of the source; its stamps count from it.
 
     Attributes:
         kept: samples in the log, all its parts together.
@@ -52,7 +52,7 @@ class Recorder:
         RecordingError: the file exists, is neither, or cannot be written.
     """
 
-    def __init__(self, path: str | Path, n: int, joint_names: Sequence[str] = ()) -> None:
+    def __init__(self, path: str | Path, n: int, joint_names: Sequence[str] = (), epoch: float | None = None) -> None:
         self.path = Path(path)
         if self.path.suffix.lower() not in RECORDS:
             raise RecordingError(
@@ -60,7 +60,7 @@ class Recorder:
             )
         if self.path.suffix.lower() == ".mcap" and len(joint_names) != n:
             raise RecordingError(f"{self.path}: an MCAP knows joints by name: expected {n}, found {len(joint_names)}")
-        self.n, self._names = n, joint_names
+        self.n, self._names, self._epoch = n, joint_names, epoch
         self.kept = 0
         self.bad = 0
         self.paths: list[Path] = []
@@ -121,7 +121,7 @@ class Recorder:
 
     def _next_part(self) -> _CsvPart | McapPart:
         path = _path_of_part(self.path, len(self.paths) + 1)
-        part = McapPart(path, self._names) if path.suffix.lower() == ".mcap" else _CsvPart(path, self.n)
+        part = McapPart(path, self._names, self._epoch) if path.suffix.lower() == ".mcap" else _CsvPart(path, self.n)
         self.paths.append(path)
         return part
 
@@ -165,10 +165,10 @@ class Recorded(Source):
     """
 
     def __init__(self, source: Source, path: str | Path, joint_names: Sequence[str] = ()) -> None:
-        self.recorder = Recorder(path, source.n, joint_names)
+        self.recorder = Recorder(path, source.n, joint_names, source.epoch)
         self.source = source
         self.name, self.n, self.rate, self.speed = source.name, source.n, source.rate, source.speed
-        self.notes = source.notes
+        self.notes, self.epoch = source.notes, source.epoch
 
     def __iter__(self) -> Iterator[Sample]:
         for sample in self.source:

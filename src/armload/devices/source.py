@@ -29,6 +29,9 @@ class Source(ABC):
         rate: nominal samples per second [Hz].
         speed: seconds of samples that come in a second: 1 but for what is replayed slower or faster.
         notes: what is made of what comes, a sentence each.
+        paced: whether its clock runs as fast as this machine's: simulated time does not.
+        epoch: of a log, time since 1970 at t = 0 [s]; where it has no date, its first sample is at 0. None: samples are
+            of now.
     """
 
     name: str
@@ -36,6 +39,8 @@ class Source(ABC):
     rate: float
     speed: float = 1.0
     notes: tuple[str, ...] = ()
+    paced: bool = True
+    epoch: float | None = None
 
     @abstractmethod
     def __iter__(self) -> Iterator[Sample]:

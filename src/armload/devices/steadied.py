@@ -49,6 +49,11 @@ class Steadied(Source):
         return self.source.speed
 
     @property
+    def epoch(self) -> float | None:  # type: ignore[override]
+        """Of the source."""
+        return self.source.epoch
+
+    @property
     def notes(self) -> tuple[str, ...]:  # type: ignore[override]
         """What is made of what comes."""
         return self.source.notes

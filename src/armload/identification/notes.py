@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.arms.tellable import tellable
 from armload.arms.units import unit_of
+from armload.identification.tare_age import in_words
 from armload.identification.thresholds import KNOWN, MOVES, NOMINAL, PAUSE_SAID
 from armload.inertia import NAMES, SHRINK, Z95
 from armload.recording import Recording, blocks
@@ -179,8 +180,9 @@ def paused(recording: Recording) -> tuple[str, ...]:
         return ()
     k = long[np.argmax(steps[long])]
     often = "" if long.size == 1 else f"{long.size} times, the longest "
+    length = f"{steps[k]:.1f} s" if steps[k] < 120.0 else in_words(float(steps[k]))
     return (
-        f"the log pauses {often}for {steps[k]:.1f} s, {recording.t[k] - recording.t[0]:.1f} s after its start: nothing "
+        f"the log pauses {often}for {length}, {recording.t[k] - recording.t[0]:.1f} s after its start: nothing "
         "is known of what was taken up or put down meanwhile; if it is not of one payload, cut it there",
     )
 

@@ -61,7 +61,10 @@ def age_of(tare: Recording | None, began: float | None, age: float | None) -> tu
     if tare is None or tare.date is None or began is None:
         return 0.0, ()
     seconds = abs(began - tare.date - tare.duration)
-    note = f"by the logs' clocks the tare is {in_words(seconds)} old: offsets and friction may have changed since"
+    told, since = f"is {in_words(seconds)} old", "since"
+    if began < tare.date:
+        told, since = f"was recorded {in_words(seconds)} after what it is the tare of", "in between"
+    note = f"by the logs' clocks the tare {told}: offsets and friction may have changed {since}"
     return seconds, (note,) if drift_after(seconds) else ()
 
 
@@ -94,10 +97,14 @@ def seconds_of(text: str) -> float:
 
 
 def in_words(seconds: float) -> str:
-    """A time as `--tare-age` takes it: 36 h is 36h, three days are 3d."""
+    """A time as `--tare-age` takes it, to three digits, without exponents.
+
+    >>> [in_words(x) for x in (90.0, 5400.0, 36 * 3600.0, 3 * DAY, 1234 * DAY)]
+    ['1.5min', '90min', '36h', '3d', '1230d']
+    """
     for unit, size in (("d", DAY), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * size or unit == "min":
-            return f"{seconds / size:.3g}{unit}"
+            return f"{float(f'{seconds / size:.3g}'):.15g}{unit}"
     raise AssertionError
 
 

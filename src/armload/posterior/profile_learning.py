@@ -145,7 +145,7 @@ def by_clock(logs: Sequence[Recording]) -> list[int]:
     for date, k in dated:
         if date - ended < SESSION:
             numbers[k] = numbers[last]
-        ended, last = date + logs[k].duration, k
+        ended, last = max(ended, date + logs[k].duration), k
     return numbers
 
 

@@ -91,7 +91,7 @@ class ArrayTable:
         array = self._load(name)
         array = array[:, 0] if element is None and array.ndim == 2 else array
         if array.dtype.kind == "M":
-            array = nanoseconds_of(array)
+            array = nanoseconds_of(array, f"{self.where}: column {name}")
         if array.dtype.kind not in "iuf":
             held = "text" if array.dtype.kind in "USO" else array.dtype
             raise RecordingError(f"{self.where}: column {name} holds {held}: expected numbers")

@@ -79,10 +79,15 @@ class RowCheck:
         if len(late):
             k = int(late[0])
             there, last = (before, first[0, 0]) if k == 0 else (row_name(k - 1), table[k - 1, 0])
-            what = "repeats the time of" if step[k] == 0 else "goes back in time from"
+            what, do = "repeats the time of", "write them with more digits, or drop the row"
+            if step[k] < 0:
+                what, do = (
+                    "goes back in time from",
+                    "sort rows out of order, or cut the log where its clock was set",
+                )
             raise RecordingError(
                 f"{where}, {row_name(k)}: t = {table[k, 0]:.6f} s {what} {there} "
-                f"(t = {last:.6f} s): expected strictly increasing times; sort the log or drop the row"
+                f"(t = {last:.6f} s): expected strictly increasing times; {do}"
             )
         self._first = self._first or row_name(int(np.flatnonzero(repeated)[0]))
         self._dropped += int(repeated.sum())

@@ -25,7 +25,8 @@ from armload.errors import RecordingError
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import column_names
 from armload.recording.csv_layout import NUMBER, check_named, layout_of
-from armload.recording.dates import nanoseconds
+from armload.recording.dates import EXPECTED, nanoseconds
+from armload.recording.header import is_time
 from armload.recording.recording import Recording
 from armload.recording.table import NotInPieces, read_table, table_chunks
 from armload.recording.text_lines import lines_of, refuse_zeros
@@ -221,7 +222,11 @@ class _Csv:
         if not cell:
             raise RecordingError(f"{self.where}, line {line}: {self.names[place]} is empty: expected a number")
         shown = cell if len(cell) <= 24 else cell[:24] + "…"
-        expected = "a date, as in the first row" if place in self.dates else "a number with a decimal point"
+        expected = "a number with a decimal point"
+        if place in self.dates:
+            expected = "a date, as in the first row"
+        elif ":" in cell or is_time(self.names[place]):
+            expected = f"a number, or {EXPECTED}"
         raise RecordingError(f"{self.where}, line {line}: {self.names[place]} is {shown!r}: expected {expected}")
 
     def _drop_torn_end(self, data: bytes) -> None:

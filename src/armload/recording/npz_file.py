@@ -150,7 +150,7 @@ def write_npz(path: Path, recording: Recording) -> None:
 def _check_shapes(arrays: dict[str, NDArray], where: str) -> None:
     """Refuse arrays t, q, dq, tau that do not fit each other, by their shapes."""
     for name in _ARRAYS:
-        if arrays[name].dtype.kind not in "iuf":
+        if arrays[name].dtype.kind not in ("iufM" if name == "t" else "iuf"):
             raise RecordingError(f"{where}: array {name} holds {arrays[name].dtype}: expected real numbers")
     t, q = arrays["t"], arrays["q"]
     if t.ndim != 1 or q.ndim != 2 or 0 in q.shape[1:]:

@@ -27,6 +27,11 @@ BLOCK = 4096  # samples that are worked on at a time: bounds the memory of what 
 JITTERED = 0.9  # of a rate's sample time, after which the next sample of that rate is due: clocks jitter
 
 
+def is_time_of_day(seconds: float) -> bool:
+    """Whether a clock that shows so much [s since 1970] shows the time of day, not the time since something began."""
+    return _CLOCK < seconds < _LAST
+
+
 class Sample(NamedTuple):
     """One instant of a robot: what every stream identifier takes."""
 
@@ -114,9 +119,11 @@ class Recording:
         late = np.flatnonzero(self.t[1:] <= self.t[:-1])
         if len(late):
             k = int(late[0])
+            back = self.t[k + 1] < self.t[k]
+            do = "sort it, or cut it where its clock was set" if back else "drop repeated rows, or keep more digits"
             raise RecordingError(
                 f"{self.source}: time goes from {self.t[k]:.6f} s to {self.t[k + 1]:.6f} s at row {k + 1}: expected "
-                "strictly increasing times; sort the log or drop repeated rows"
+                f"strictly increasing times; {do}"
             )
 
     def __repr__(self) -> str:
@@ -147,7 +154,7 @@ class Recording:
     def date(self) -> float | None:
         """Time of day of the first sample [s since 1970]; None: the clock counts from something else, or is wrong."""
         began = self.epoch + float(self.t[0])
-        return began if _CLOCK < began < _LAST else None
+        return began if is_time_of_day(began) else None
 
     @property
     def n(self) -> int:

@@ -168,7 +168,8 @@ class Reconnecting(Source):
             if self.state == "lost" or self.connections > 1:
                 self._said(f"{self.name} sends samples again")
             self.state, self.why, self.resumed = "streaming", None, now
-        self._late = self._transit.late(sample.t / self.speed, arrived)
+        paced = self._source.paced
+        self._late = self._transit.late(sample.t / self.speed, arrived) if paced else 0.0
         self.heard, self._arrived = now, arrived - self._late
         if now - arrived > BEHIND:
             self._source.leave()

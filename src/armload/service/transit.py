@@ -1,7 +1,9 @@
 """How long a sample was on its way to this machine, beyond the shortest way there was lately.
 
 Nobody knows the robot's clock, but arrival − t has a floor: the shortest way plus what the clocks differ by. What a
-sample is above the floor of the last minute it has waited, in a network or in a reader that got no processor.
+sample is above the floor of the last minute it has waited, in a network or in a reader that got no processor. That
+holds of clocks that run as fast as this machine's (`Source.paced`): simulated time that runs slower would look later
+and later.
 """
 
 from __future__ import annotations
@@ -22,15 +24,18 @@ class Transit:
 
     def __init__(self) -> None:
         self._floor = self._before = math.inf
-        self._began = self._last = -math.inf
+        self._began = self._newest = -math.inf
+        self._behind = math.inf  # time of the sample before, if it was older than the newest
 
     def late(self, t: float, arrived: float) -> float:
         """How late a sample arrived [s]; t: its own time, arrived: on this machine's monotonic clock [s]."""
         if not math.isfinite(t):
             return 0.0
-        if t < self._last - _SET:
+        older = t < self._newest
+        if t < self._newest - _SET or (older and t > self._behind):  # two running: a clock that was set, as in a record
             self.__init__()
-        self._last = t
+        self._behind = t if older else math.inf
+        self._newest = max(self._newest, t)
         if arrived - self._began > _WINDOW:
             self._before, self._floor, self._began = self._floor, math.inf, arrived
         self._floor = min(self._floor, arrived - t)

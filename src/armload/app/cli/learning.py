@@ -26,7 +26,7 @@ def learn_from(session: Session, path: str) -> None:
 
     name = session.source.name
     if not os.path.exists(name):  # else of a log, which has a name of its own
-        name = f"{name} {time.strftime('%Y-%m-%d %H:%M')}"
+        name = f"{name} {time.strftime('%Y-%m-%d %H:%M UTC', time.gmtime())}"
     while True:
         before = contents_of(path)
         try:

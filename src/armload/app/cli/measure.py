@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 def run(options: argparse.Namespace) -> int | None:
     """Measure; 2 after an error, 130 after Ctrl-C, and the arm is at rest in any case."""
-    from datetime import datetime
+    from datetime import UTC, datetime
 
     from armload.devices import Thresholds, open_mover
     from armload.excitation import Accuracy
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int | None:
     mounted = tool if options.mounted in (None, "nothing") else part_of(options.mounted, arm.frame, arm)
     check_tare_age(options)
     _, tare = read_logs(options, arm, None, options.tare)
-    folder = options.dir or f"measurement-{datetime.now():%Y%m%d-%H%M%S}"
+    folder = options.dir or f"measurement-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     if options.out is not None and (log := _log_called(options.out, folder)):
         raise UsageError(f"--out {options.out} would replace the measurement's own {log}: name another file")
     heaviest = Basis(**known).heaviest

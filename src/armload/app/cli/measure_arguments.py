@@ -81,7 +81,7 @@ def parser() -> Parser:
     add("--dry-run", action="store_true", help="connect, say what would move and check it; move nothing")
     add("--move", action="store_true", help="move without asking: for who has seen the dry run")
     add("--until", metavar="WIDTHS", help="stop when 95%% half-widths are mass=10g,moment=1.5g.m,inertia=1e-3")
-    add("--dir", type=output_folder, metavar="DIR", help="folder of the logs (default: measurement-DATE-TIME)")
+    add("--dir", type=output_folder, metavar="DIR", help="folder of the logs (default: measurement-TIME, in UTC)")
     add(
         "--tare", type=file_name, metavar="LOG0", help="a log of the empty arm: no empty run, the payload is on already"
     )

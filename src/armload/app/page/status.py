@@ -91,8 +91,8 @@ def _tare_in_words(tare: Tare) -> str:
         return f"taken {in_words(age)} ago"
     if tare.age:
         return f"{log.source}, {in_words(age)} old"
-    if log.epoch:
-        return f"{log.source}, {in_words(max(time.time() - log.epoch - float(log.t[-1]), 0.0))} old"
+    if log.date is not None:
+        return f"{log.source}, {in_words(max(time.time() - log.date - log.duration, 0.0))} old"
     return f"{log.source}, which does not say when it was recorded"
 
 

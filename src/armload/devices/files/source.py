@@ -59,6 +59,7 @@ class Replay(Source):
         self.name = recording.source
         self.n = recording.n
         self.rate = recording.rate
+        self.epoch = recording.epoch if recording.date is not None else -float(recording.t[0])
         self.loop = loop
         self._payload = payload
         self._pace = Pace(speed)

@@ -19,6 +19,7 @@ from armload.arms import Arm, names_among
 from armload.devices.ros2.effort import Effort
 from armload.errors import SourceError
 from armload.recording import Sample
+from armload.recording.recording import is_time_of_day
 from armload.recording.steadied import AROUND
 
 _MOST_LAYOUTS = 64  # lists of names remembered; a publisher that invents names cannot fill the memory
@@ -85,6 +86,11 @@ class JointStates:
         """When t was on the robot's clock, since 1970 (or the start of simulated time) [ns]; 0 before any sample."""
         zero = self._first_received if self._zero is None else self._zero
         return 0 if zero is None else zero + round(t * 1e9)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its stamps do not show the time of day, as those of simulated time, which has a pace of its own."""
+        return self._zero is not None and not is_time_of_day(self._zero / 1e9)
 
     def _time(self, stamp: Any, received: int) -> float:
         """Seconds since the first sample: by the stamps from the first stamped message on."""

@@ -13,6 +13,7 @@ from armload.arms import Arm
 from armload.devices.ros2.connection import SENSOR_DEPTH, Ros2Connection
 from armload.devices.ros2.effort import Effort
 from armload.devices.ros2.joint_states import JointStates, velocities_of_positions
+from armload.devices.ros2.receipt import Receipt
 from armload.devices.source import Source
 from armload.errors import SourceError
 from armload.recording import GAP, Sample, Steadying
@@ -62,6 +63,7 @@ class Ros2Source(Source):
         self._arm, self._timeout, self._closed = arm, timeout, False
         self._states = JointStates(arm, topic, effort, needs_velocities)
         self._received: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
+        self._receipt = Receipt()
         self._steadying: Steadying | None = None  # tells velocities, where the topic has none
         self._ready: deque[tuple[Sample, float]] = deque()
         self._arrived: float | None = None
@@ -72,6 +74,7 @@ class Ros2Source(Source):
             if rate is None:
                 self.rate = self._measured_rate()
                 self._check_rate()
+            self.paced = not self._states.simulated
         except BaseException:
             self.close()
             raise
@@ -124,8 +127,8 @@ class Ros2Source(Source):
                 sample = self._states.sample(message, received)
                 if sample is not None:
                     heard = time.monotonic()
-                    waited = max(0, time.time_ns() - received) if received else 0  # a middleware may not tell
-                    self._ready.extend(self._told(sample, heard - waited / 1e9))
+                    waited = self._receipt.waited(received, time.time_ns(), time.monotonic_ns())
+                    self._ready.extend(self._told(sample, heard - waited))
             silent = time.monotonic() - heard
             if self._steadying is not None and silent > GAP and not self._ready:
                 self._ready.extend(self._steadying.flush())
