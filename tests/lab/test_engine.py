@@ -79,7 +79,7 @@ sys.exit(entry.main([]))
 
 @pytest.mark.parametrize("seconds", [0.05, 0.3, 0.6])
 def test_ctrl_c_while_processes_begin_is_one_line(seconds):
-    words = [sys.executable, "-c", SLEEPY]
+    words = ["env", "--default-signal=INT", sys.executable, "-c", SLEEPY]  # a background job's children ignore it
     command = subprocess.Popen(words, stdout=-1, stderr=-1, text=True, start_new_session=True)
     assert command.stdout is not None
     command.stdout.readline()
