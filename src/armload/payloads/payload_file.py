@@ -177,10 +177,8 @@ def read_content(path: str | Path) -> dict[str, Any]:
         raise PayloadError(f"payload file {path} does not exist: expected a JSON file with a payload") from None
     except UnicodeDecodeError:
         raise PayloadError(f"payload file {path} is not text: expected JSON in UTF-8") from None
-    except OSError as error:
-        raise PayloadError(f"payload file {path} cannot be read: {error.strerror}") from None
-    except ValueError as error:  # a name with a zero in it
-        raise PayloadError(f"payload file {path} cannot be read: {error}") from None
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero in it
+        raise PayloadError(f"payload file {path} cannot be read: {getattr(error, 'strerror', error)}") from None
     if not text.strip():
         raise PayloadError(f"payload file {path} is empty: expected JSON with phi, or mass, com and inertia_com")
     try:
