@@ -48,6 +48,12 @@ class Cell:
         self.wait(lambda: run.poll() is not None or len(self.said("moving")) == 2, 120, self.robot, run)
         time.sleep(1.5)
 
+    def off_its_path_at_rest(self):
+        """How far from the path of its motion the arm has come to rest [rad]."""
+        self.wait(lambda: len(self.said("rest")) == 2, 20, self.robot)
+        path = self.motion.position(np.linspace(0.0, self.motion.duration, 5001))
+        return np.abs(path - self.said("rest")[-1]["q"]).max(axis=1).min()
+
     def ended(self, run):
         """Its exit code and the last line that it said, once it has ended."""
         self.wait(lambda: run.poll() is not None, 90, self.robot, run)
@@ -93,9 +99,7 @@ def test_an_arm_in_fault_on_its_way_rests_on_its_path_and_the_fault_is_named(cel
         code, line = cell.ended(run)
     assert code == 2
     assert re.search(f"{said}.*; what was recorded until then is in .*empty.csv$", line), line
-    cell.wait(lambda: len(cell.said("rest")) == 2, 20, cell.robot)
-    path = cell.motion.position(np.linspace(0.0, cell.motion.duration, 5001))
-    assert np.abs(path - cell.said("rest")[-1]["q"]).max(axis=1).min() < 0.01
+    assert cell.off_its_path_at_rest() < 0.01  # [rad]
     assert len(cell.said("moving")) == 2  # and nothing moves it again
     assert np.abs(read_recording(cell.folder / "logs" / "empty.csv", arm("panda")).dq).max() > 0.1
 
@@ -110,9 +114,7 @@ def test_an_arm_whose_measurement_did_not_run_for_a_while_rests_on_its_path_and_
         code, line = cell.ended(run)
     assert code == 2
     assert re.search(r"no (trajectory could be sent|sample came) for \d\.\d\d s", line), line
-    cell.wait(lambda: len(cell.said("rest")) == 2, 20, cell.robot)
-    path = cell.motion.position(np.linspace(0.0, cell.motion.duration, 5001))
-    assert np.abs(path - cell.said("rest")[-1]["q"]).max(axis=1).min() < 0.01
+    assert cell.off_its_path_at_rest() < 0.01  # [rad]
     assert "refused" not in cell.robot.noted()  # what asks for a jump is, here: another controller would jump
 
 

@@ -23,13 +23,15 @@ class Cell:
     """A joint trajectory controller, its joint states, the topics between, and the clock of all of them.
 
     After its 300th sample whoever listens does not run for `held_up` [s]: samples wait meanwhile, and nobody says so.
+    Four samples later its clock jumps by `jump` [s].
     """
 
     rate = 1.0 / CYCLE
     name = "/joint_states"
 
-    def __init__(self, robot, held_up):
-        self.robot, self.held_up, self.now = robot, held_up, 0.0
+    def __init__(self, robot, held_up, jump=0.0):
+        self.robot, self.held_up, self.jump, self.now = robot, held_up, jump, 0.0
+        self.jumped = 0.0
         self.orders = [(0.0, None)]  # from when, which trajectory
         self.speeds = []  # the fastest of each trajectory [rad/s]
         kinds = {"JointTrajectory": self._message, "JointTrajectoryPoint": self._message}
@@ -49,7 +51,7 @@ class Cell:
         return q[0], dq[0], ddq[0]
 
     def _take(self, message):
-        motion = read_trajectory(message, self.robot, self.at(self.now), EPOCH + round(1e9 * self.now))
+        motion = read_trajectory(message, self.robot, self.at(self.now), self.stamp(self.now + self.jumped))
         self.orders.append((self.now, motion))
         self.speeds.append(np.abs(motion.velocity(np.arange(0.0, motion.duration, 1e-3))).max())
 
@@ -57,8 +59,9 @@ class Cell:
         for k in range(4000):
             t = k * CYCLE
             self.now = max(self.now + 1e-4, t) + self.held_up * (k == 300)
+            self.jumped = self.jump * (k > 303)
             q, dq, _ = self.at(t)
-            yield Sample(t, q, dq, self.robot.torque(q))
+            yield Sample(t + self.jumped, q, dq, self.robot.torque(q))
 
     def stamp(self, t):
         return EPOCH + round(1e9 * t)
@@ -72,20 +75,35 @@ class Cell:
 
 @pytest.mark.parametrize("held_up", [0.0, 0.3, 0.6, 0.9, 2.0])
 def test_a_controller_is_never_told_to_catch_up_with_a_path_that_it_has_left(held_up, monkeypatch):
-    robot = arm("panda")
-    cell = Cell(robot, held_up)
-    monkeypatch.setattr("armload.devices.ros2.mover.Ros2Source", lambda *_, **__: cell)
-    monkeypatch.setattr("armload.devices.mover.time", SimpleNamespace(monotonic=lambda: cell.now))
-    mover = Ros2Mover("/joint_states", robot)
-    mover._seen = MOTION.position([0.0])[0]
-    list(samples_of_movement(mover, MOTION))
-    planned = np.abs(MOTION.velocity(np.linspace(0.0, MOTION.duration, 2001))).max()
-    assert max(cell.speeds) < 1.05 * planned
-    rest, speed, _ = cell.at(cell.now)
-    assert not speed.any()
-    path = MOTION.position(np.linspace(0.0, MOTION.duration, 5001))
-    assert np.abs(path - rest).max(axis=1).min() < 1e-3
+    mover = moved(cell := Cell(arm("panda"), held_up), monkeypatch)
+    assert rests_on_its_path(cell)
     if held_up < 0.5:
         assert mover.why is None
     else:
         assert "s (expected less than 0.5 s): this process did not run" in mover.why
+
+
+@pytest.mark.parametrize("held_up", [0.0, 0.3])
+def test_a_clock_that_jumps_back_while_samples_wait_stops_the_arm_on_its_path(held_up, monkeypatch):
+    mover = moved(cell := Cell(arm("panda"), held_up, jump=-30.0), monkeypatch)
+    assert rests_on_its_path(cell)
+    assert "the clock of its samples jumped by -30" in mover.why
+
+
+def moved(cell, monkeypatch):
+    """What moved the arm of a cell, once its movement has ended."""
+    monkeypatch.setattr("armload.devices.ros2.mover.Ros2Source", lambda *_, **__: cell)
+    monkeypatch.setattr("armload.devices.mover.time", SimpleNamespace(monotonic=lambda: cell.now))
+    mover = Ros2Mover("/joint_states", cell.robot)
+    mover._seen = MOTION.position([0.0])[0]
+    list(samples_of_movement(mover, MOTION))
+    return mover
+
+
+def rests_on_its_path(cell):
+    """Whether it does, and was never told to be faster than planned."""
+    planned = np.abs(MOTION.velocity(np.linspace(0.0, MOTION.duration, 2001))).max()
+    assert max(cell.speeds) < 1.05 * planned
+    rest, speed, _ = cell.at(cell.now)
+    path = MOTION.position(np.linspace(0.0, MOTION.duration, 5001))
+    return not speed.any() and np.abs(path - rest).max(axis=1).min() < 1e-3

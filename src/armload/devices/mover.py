@@ -198,7 +198,8 @@ class Movement:
         if np.isnan(before):
             return 0.0, 0.0
         passed, waited = t - before, self.behind + self._seen - seen
-        self.behind = max(0.0, waited - passed) if waited > SILENCE or self.behind else 0.0
+        if passed >= 0.0:  # else their clock was set back, which tells nothing of what waits
+            self.behind = max(0.0, waited - passed) if waited > SILENCE or self.behind else 0.0
         return passed, waited
 
     def target(self, t: float) -> NDArray[np.float64]:

@@ -25,9 +25,8 @@ class Receipt:
         """
         if not received:
             return 0.0
-        ahead = wall - monotonic
-        before = wall - received if self._ahead is None else monotonic + self._ahead - received
         now = wall - received
+        before = now if self._ahead is None else monotonic + self._ahead - received
         if before < 0 or now <= before:
-            self._ahead = ahead
+            self._ahead = wall - monotonic
         return max(0, min(before, now)) / 1e9
