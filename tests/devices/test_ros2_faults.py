@@ -3,6 +3,7 @@
 import contextlib
 import json
 import re
+import signal
 import time
 from pathlib import Path
 
@@ -101,6 +102,20 @@ def test_an_arm_in_fault_on_its_way_rests_on_its_path_and_the_fault_is_named(cel
     assert cell.off_its_path_at_rest() < 0.01  # [rad]
     assert len(cell.said("moving")) == 2  # and nothing moves it again
     assert np.abs(read_recording(cell.folder / "logs" / "empty.csv", arm("panda")).dq).max() > 0.1
+
+
+@pytest.mark.parametrize("seconds", [0.8, 2.0])
+def test_an_arm_whose_measurement_did_not_run_for_a_while_rests_on_its_path_and_is_told_nothing_wild(cell, seconds):
+    with cell.measure("--move") as run:
+        cell.on_its_way(run)
+        run.send_signal(signal.SIGSTOP)
+        time.sleep(seconds)
+        run.send_signal(signal.SIGCONT)
+        code, line = cell.ended(run)
+    assert code == 2
+    assert re.search(r"no (trajectory could be sent|sample came) for \d\.\d\d s", line), line
+    assert cell.off_its_path_at_rest() < 0.01  # [rad]
+    assert "refused" not in cell.robot.noted()  # what asks for a jump is, here: another controller would jump
 
 
 def test_a_controller_that_takes_no_way_to_the_start_is_named_before_the_next_movement(cell):

@@ -184,13 +184,23 @@ class Movement:
         self.supervision = Supervision(arm, motion, thresholds)
         self.begun: float | None = None
         self.newest, self._seen = np.nan, np.nan  # the newest sample's time, and when that was seen
+        self.behind = 0.0  # [s] how old the newest sample is at least, should samples have waited unseen
         self._away = away
 
     def heard_at(self, t: float) -> tuple[float, float]:
-        """How far the samples' clock, now at t, and ours went on since the sample before [s]; 0 at the first one."""
+        """How far the samples' clock, now at t, and ours went on since the sample before [s]; 0 at the first one.
+
+        While this process does not run (it is stopped, its disk hangs), samples wait where nobody says since when. So
+        what ours went on beyond theirs is kept until they have caught up (`behind`), and counts as waited, too.
+        """
         before, seen = self.newest, self._seen
         self.newest, self._seen = t, time.monotonic()
-        return (0.0, 0.0) if np.isnan(before) else (t - before, self._seen - seen)
+        if np.isnan(before):
+            return 0.0, 0.0
+        passed, waited = t - before, self.behind + self._seen - seen
+        if passed >= 0.0:  # else their clock was set back, which tells nothing of what waits
+            self.behind = max(0.0, waited - passed) if waited > SILENCE or self.behind else 0.0
+        return passed, waited
 
     def target(self, t: float) -> NDArray[np.float64]:
         """The command q (n,) for t [s] on the movement's clock: without a jump from where the arm was held."""

@@ -87,13 +87,28 @@ class Ros2Mover(StreamedMover):
         movement = self._took(sample, lambda at=sample.t: self._begins(at))
         if movement is not None:
             assert movement.begun is not None
-            t = sample.t - movement.begun + self._source.lag()
+            t = self._now(movement, movement.begun)
             braked = movement.course.braked
+            self._late(movement.course, t)
             self._brakes(movement, t + _LEAD)
             if movement.course.braked != braked or t - self._sent >= _EVERY:
                 self._send(movement.course, t)
         elif under_way is not None and self.why is None:
             self.why = self._left()
+
+    def _now(self, movement: Movement, begun: float) -> float:
+        """The instant of a movement that the controller is at, after its newest sample [s]."""
+        return movement.newest - begun + max(self._source.lag(), movement.behind)
+
+    def _late(self, course: Course, t: float) -> None:
+        """Brake where the newest trajectory does, if it is too late for another: from there on the arm is elsewhere."""
+        braking = max(self._sent, 0.0) + _AHEAD
+        if course.braked is None and np.isfinite(self._sent) and braking < min(t + _LEAD, course.duration):
+            course.brake(braking)
+            self.why = self._stop_for = self._stop_for or (
+                f"no trajectory could be sent for {t - self._sent:.2f} s (expected less than {_AHEAD - _LEAD:g} s): "
+                "this process did not run; see what held it up, and give this machine less other work"
+            )
 
     def _left(self) -> str | None:
         """What is left to where a movement has ended, if that is more than a controller lets an arm hang."""
@@ -158,7 +173,7 @@ class Ros2Mover(StreamedMover):
     def _silent(self, movement: Movement, passed: float) -> None:  # noqa: ARG002
         """Brake where the newest trajectory does, at the latest: the controller has followed it meanwhile."""
         assert movement.begun is not None
-        now = movement.newest - movement.begun + self._source.lag()
+        now = self._now(movement, movement.begun)
         movement.course.brake(min(max(now, 0.0) + _LEAD, max(self._sent, 0.0) + _AHEAD))
 
     def _jumped(self, movement: Movement, passed: float) -> None:

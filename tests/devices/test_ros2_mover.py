@@ -1,0 +1,109 @@
+"""What a ROS 2 controller is told by a process that did not run for a while; without ROS 2."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from armload.arms import arm
+from armload.devices.mover import samples_of_movement
+from armload.devices.ros2.mover import Ros2Mover
+from armload.devices.ros2.trajectory import read_trajectory
+from armload.motion import FourierMotion
+from armload.recording import Sample
+
+POSE = np.array([0.0, -0.5, 0.1, -2.0, 0.1, 1.7, 0.5])
+SWING = 0.12 * np.array([[1.0, 0.3, -1.6 / 3]] * 7)
+MOTION = FourierMotion(POSE, SWING, 0.0 * SWING, 5.0, "small").smooth()
+CYCLE = 0.005  # [s] of the joint states
+EPOCH = 1_000_000_000_000  # [ns]
+
+
+class Cell:
+    """A joint trajectory controller, its joint states, the topics between, and the clock of all of them.
+
+    After its 300th sample whoever listens does not run for `held_up` [s]: samples wait meanwhile, and nobody says so.
+    Four samples later its clock jumps by `jump` [s].
+    """
+
+    rate = 1.0 / CYCLE
+    name = "/joint_states"
+
+    def __init__(self, robot, held_up, jump=0.0):
+        self.robot, self.held_up, self.jump, self.now = robot, held_up, jump, 0.0
+        self.jumped = 0.0
+        self.orders = [(0.0, None)]  # from when, which trajectory
+        self.speeds = []  # the fastest of each trajectory [rad/s]
+        kinds = {"JointTrajectory": self._message, "JointTrajectoryPoint": self._message}
+        self.connection = SimpleNamespace(publisher=lambda *_: self._take, listeners=lambda _: 1, **kinds)
+
+    @staticmethod
+    def _message():
+        stamp = SimpleNamespace(sec=0, nanosec=0)
+        return SimpleNamespace(header=SimpleNamespace(stamp=stamp), time_from_start=SimpleNamespace(sec=0, nanosec=0))
+
+    def at(self, t):
+        """Position, velocity and acceleration that the arm is commanded at t."""
+        since, motion = [order for order in self.orders if order[0] <= t][-1]
+        if motion is None:
+            return MOTION.position([0.0])[0], np.zeros(7), np.zeros(7)
+        q, dq, ddq = motion([min(t - since, motion.duration)])
+        return q[0], dq[0], ddq[0]
+
+    def _take(self, message):
+        motion = read_trajectory(message, self.robot, self.at(self.now), self.stamp(self.now + self.jumped))
+        self.orders.append((self.now, motion))
+        self.speeds.append(np.abs(motion.velocity(np.arange(0.0, motion.duration, 1e-3))).max())
+
+    def ticking(self, _):
+        for k in range(4000):
+            t = k * CYCLE
+            self.now = max(self.now + 1e-4, t) + self.held_up * (k == 300)
+            self.jumped = self.jump * (k > 303)
+            q, dq, _ = self.at(t)
+            yield Sample(t + self.jumped, q, dq, self.robot.torque(q))
+
+    def stamp(self, t):
+        return EPOCH + round(1e9 * t)
+
+    def lag(self):
+        return 0.0
+
+    def arrived(self):
+        return None
+
+
+@pytest.mark.parametrize("held_up", [0.0, 0.3, 0.6, 0.9, 2.0])
+def test_a_controller_is_never_told_to_catch_up_with_a_path_that_it_has_left(held_up, monkeypatch):
+    mover = moved(cell := Cell(arm("panda"), held_up), monkeypatch)
+    assert rests_on_its_path(cell)
+    if held_up < 0.5:
+        assert mover.why is None
+    else:
+        assert "s (expected less than 0.5 s): this process did not run" in mover.why
+
+
+@pytest.mark.parametrize("held_up", [0.0, 0.3])
+def test_a_clock_that_jumps_back_while_samples_wait_stops_the_arm_on_its_path(held_up, monkeypatch):
+    mover = moved(cell := Cell(arm("panda"), held_up, jump=-30.0), monkeypatch)
+    assert rests_on_its_path(cell)
+    assert "the clock of its samples jumped by -30" in mover.why
+
+
+def moved(cell, monkeypatch):
+    """What moved the arm of a cell, once its movement has ended."""
+    monkeypatch.setattr("armload.devices.ros2.mover.Ros2Source", lambda *_, **__: cell)
+    monkeypatch.setattr("armload.devices.mover.time", SimpleNamespace(monotonic=lambda: cell.now))
+    mover = Ros2Mover("/joint_states", cell.robot)
+    mover._seen = MOTION.position([0.0])[0]
+    list(samples_of_movement(mover, MOTION))
+    return mover
+
+
+def rests_on_its_path(cell):
+    """Whether it does, and was never told to be faster than planned."""
+    planned = np.abs(MOTION.velocity(np.linspace(0.0, MOTION.duration, 2001))).max()
+    assert max(cell.speeds) < 1.05 * planned
+    rest, speed, _ = cell.at(cell.now)
+    path = MOTION.position(np.linspace(0.0, MOTION.duration, 5001))
+    return not speed.any() and np.abs(path - rest).max(axis=1).min() < 1e-3
