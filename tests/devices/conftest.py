@@ -75,7 +75,8 @@ def wait_until():
         until = time.monotonic() + seconds
         while not true():
             if time.monotonic() > until:
-                pytest.fail("\n".join(["it did not come:", *(p.noted() for p in processes)]))
+                said = (line for p in processes for line in (p.noted(), *p.printed_lines()))
+                pytest.fail("\n".join(["it did not come:", *said]))
             time.sleep(0.05)
 
     return wait

@@ -361,6 +361,18 @@ def test_an_order_replaces_the_motion_without_a_jump_and_keeps_what_was_asked_fo
     assert np.allclose(commanded.position([0.0, 5.0]), 0.2)
 
 
+def test_orders_that_follow_each_other_fast_change_nothing_of_what_was_asked_for(panda):
+    commanded = CommandedMotion(taie2024())
+    t = np.linspace(0.0, 1.3, 14)
+    asked = commanded.velocity(t)
+    for k in range(1, 4):
+        goal = commanded.state[0] - 0.1
+        commanded.order(read_trajectory(trajectory(panda.joint_names, [(1.0, goal, 0 * goal, [])]), panda, commanded.state))
+        t = np.append(t, 1.3 + 0.01 * k)
+        asked = np.vstack([asked, commanded.velocity(t[-1:])])
+        assert np.allclose(commanded.velocity(t), asked, rtol=0, atol=1e-12)
+
+
 # ------------------------------------------------------------------ without ROS, and with it
 
 

@@ -23,15 +23,15 @@ class Cell:
     """A joint trajectory controller, its joint states, the topics between, and the clock of all of them.
 
     After its 300th sample whoever listens does not run for `held_up` [s]: samples wait meanwhile, and nobody says so.
-    Four samples later its clock jumps by `jump` [s].
+    Four samples later its clock jumps by `jump` [s]. Simulated time goes on by `pace` of ours.
     """
 
     rate = 1.0 / CYCLE
     name = "/joint_states"
 
-    def __init__(self, robot, held_up, jump=0.0):
-        self.robot, self.held_up, self.jump, self.now = robot, held_up, jump, 0.0
-        self.jumped = 0.0
+    def __init__(self, robot, held_up, jump=0.0, pace=1.0):
+        self.robot, self.held_up, self.jump, self.pace = robot, held_up, jump, pace
+        self.now, self.jumped, self.paced = 0.0, 0.0, pace == 1.0
         self.orders = [(0.0, None)]  # from when, which trajectory
         self.speeds = []  # the fastest of each trajectory [rad/s]
         kinds = {"JointTrajectory": self._message, "JointTrajectoryPoint": self._message}
@@ -51,14 +51,15 @@ class Cell:
         return q[0], dq[0], ddq[0]
 
     def _take(self, message):
-        motion = read_trajectory(message, self.robot, self.at(self.now), self.stamp(self.now + self.jumped))
-        self.orders.append((self.now, motion))
+        now = self.now * self.pace
+        motion = read_trajectory(message, self.robot, self.at(now), self.stamp(now + self.jumped))
+        self.orders.append((now, motion))
         self.speeds.append(np.abs(motion.velocity(np.arange(0.0, motion.duration, 1e-3))).max())
 
     def ticking(self, _):
         for k in range(4000):
             t = k * CYCLE
-            self.now = max(self.now + 1e-4, t) + self.held_up * (k == 300)
+            self.now = max(self.now + 1e-4, t / self.pace) + self.held_up * (k == 300)
             self.jumped = self.jump * (k > 303)
             q, dq, _ = self.at(t)
             yield Sample(t + self.jumped, q, dq, self.robot.torque(q))
@@ -90,6 +91,12 @@ def test_a_clock_that_jumps_back_while_samples_wait_stops_the_arm_on_its_path(he
     assert "the clock of its samples jumped by -30" in mover.why
 
 
+def test_an_arm_in_slow_simulated_time_goes_on_after_a_short_pause(monkeypatch):
+    mover = moved(cell := Cell(arm("panda"), 0.2, pace=0.7), monkeypatch)
+    assert mover.why is None
+    assert rests_on_its_path(cell)
+
+
 def moved(cell, monkeypatch):
     """What moved the arm of a cell, once its movement has ended."""
     monkeypatch.setattr("armload.devices.ros2.mover.Ros2Source", lambda *_, **__: cell)
@@ -104,6 +111,6 @@ def rests_on_its_path(cell):
     """Whether it does, and was never told to be faster than planned."""
     planned = np.abs(MOTION.velocity(np.linspace(0.0, MOTION.duration, 2001))).max()
     assert max(cell.speeds) < 1.05 * planned
-    rest, speed, _ = cell.at(cell.now)
+    rest, speed, _ = cell.at(cell.now * cell.pace)
     path = MOTION.position(np.linspace(0.0, MOTION.duration, 5001))
     return not speed.any() and np.abs(path - rest).max(axis=1).min() < 1e-3

@@ -97,8 +97,11 @@ class Ros2Mover(StreamedMover):
             self.why = self._left()
 
     def _now(self, movement: Movement, begun: float) -> float:
-        """The instant of a movement that the controller is at, after its newest sample [s]."""
-        return movement.newest - begun + max(self._source.lag(), movement.behind)
+        """The instant of a movement that the controller is at, after its newest sample [s].
+
+        Where simulated time runs slower than ours, what it is behind does not tell that samples wait.
+        """
+        return movement.newest - begun + max(self._source.lag(), movement.behind if self._source.paced else 0.0)
 
     def _late(self, course: Course, t: float) -> None:
         """Brake where the newest trajectory does, if it is too late for another: from there on the arm is elsewhere."""

@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 from armload.motion import Motion
 
+_KEPT = 1.0  # [s] for which what was commanded can still be asked for: samples are published up to 0.04 s after
+
 
 class CommandedMotion(Motion):
     """A motion without an end that can be replaced by another at any time.
 
     A simulator asks ahead, for a piece at a time: what it has asked for is not changed any more, and a new order begins
-    there.
+    there. What was commanded during the last second can be asked for again.
 
     >>> from armload.motion import taie2024
     >>> commanded = CommandedMotion(taie2024())
@@ -51,7 +53,8 @@ class CommandedMotion(Motion):
     def order(self, motion: Motion) -> float:
         """Do this from now on; returns when that is [s]. It should begin as `state` says."""
         begun = [each for each in self._orders if each[0] < self.asked]  # what never began is forgotten
-        self._orders = [*begun[-1:], (self.asked, motion)]
+        over = sum(end < self.asked - _KEPT for end, _ in begun[1:])
+        self._orders = [*begun[over:], (self.asked, motion)]
         return self.asked
 
     def derivative(self, t: NDArray[np.float64], order: int) -> NDArray[np.float64]:
