@@ -367,7 +367,8 @@ def test_orders_that_follow_each_other_fast_change_nothing_of_what_was_asked_for
     asked = commanded.velocity(t)
     for k in range(1, 4):
         goal = commanded.state[0] - 0.1
-        commanded.order(read_trajectory(trajectory(panda.joint_names, [(1.0, goal, 0 * goal, [])]), panda, commanded.state))
+        message = trajectory(panda.joint_names, [(1.0, goal, 0 * goal, [])])
+        commanded.order(read_trajectory(message, panda, commanded.state))
         t = np.append(t, 1.3 + 0.01 * k)
         asked = np.vstack([asked, commanded.velocity(t[-1:])])
         assert np.allclose(commanded.velocity(t), asked, rtol=0, atol=1e-12)
