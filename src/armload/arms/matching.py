@@ -63,8 +63,8 @@ def flange_named(arm: Arm, sheets: Iterable[ArmFacts], beside: str | None = None
     return next((names[0] for names in (exact, found) if len(names) == 1), None)
 
 
-def from_frame(arm: Arm, frame: str) -> NDArray[np.float64]:
-    """T (10, 10): phi about the arm's payload frame is T·phi about another frame behind its last joint.
+def from_frame(arm: Arm, frame: str | None) -> NDArray[np.float64]:
+    """T (10, 10): phi about the arm's payload frame is T·phi about another frame behind its last joint; None: that one.
 
     Raises:
         ArmError: see `Arm.in_frame`.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.arms import Arm, rated_mass
+from armload.arms import Arm, from_frame, rated_mass
 from armload.errors import IdentificationError
 from armload.estimators import Estimate
 from armload.identification.thresholds import HEAVIEST
@@ -110,5 +110,5 @@ def any_inertia(tool: InertialParameters) -> tuple[NDArray[np.float64], NDArray[
 
 def in_frame(arm: Arm, covariance: NDArray[np.float64], frame: str | None) -> NDArray[np.float64]:
     """A covariance (10, 10) of phi about the arm's payload frame, from another."""
-    T = np.column_stack([arm.in_frame(InertialParameters(e, frame)).phi for e in np.eye(10)])
+    T = from_frame(arm, frame)
     return T @ covariance @ T.T
