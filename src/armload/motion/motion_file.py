@@ -165,7 +165,8 @@ def _spline(content: dict[str, Any]) -> SplineMotion:
 def _path(content: dict[str, Any]) -> PathMotion:
     from armload.motion.path import PathMotion
 
-    return PathMotion(*_numbers(content, "times", "positions", "velocities", "accelerations"), *_called(content))
+    times, q, dq, ddq = _numbers(content, "times", "positions", "velocities", "accelerations")
+    return PathMotion(times, q, dq, ddq, *_called(content))
 
 
 def _numbers(content: dict[str, Any], *keys: str) -> list[Any]:
