@@ -156,6 +156,7 @@ def test_a_change_of_payload_is_listed_with_its_mass_once_that_is_known():
     text = tables.events(log)
     assert "grasp, +1.48 kg" in text
     assert "change</div>" in text
+    assert "grasp, +0.0041 kg" in tables.events([Entry(2.0, "", Event("grasp", 2.0, 1.9, 0.00412, 4))])
 
 
 def _luminance(colour):

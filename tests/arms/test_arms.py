@@ -999,3 +999,32 @@ def test_threads_that_share_an_arm_get_the_numbers_that_one_alone_gets():
     with ThreadPoolExecutor(len(positions)) as pool:
         together = list(pool.map(asked, positions))
     assert all(np.array_equal(x, y) for a, b in zip(alone, together, strict=True) for x, y in zip(a, b, strict=True))
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_description_in_millimetres_is_refused_by_its_lengths(name, tmp_path):
+    """Else its torques are called too small: they were "0% of the torque" that it needs to carry itself."""
+    (tmp_path / "mine.urdf").write_text(scaled(description_of(name), 1e3))
+    with pytest.raises(ArmError, match=r"links of mine are \d+ m long together.*expected 50 m at most.*are these mm\?"):
+        arm(tmp_path / "mine.urdf", ARMS[name].flange)
+
+
+def test_where_an_arm_stands_is_none_of_its_lengths(tmp_path):
+    text = description_of("ur10e")
+    first = re.search(r'<origin[^>]*xyz="([^"]*)"', text[text.index('<joint name="shoulder_pan_joint"') :])
+    (tmp_path / "far.urdf").write_text(text.replace(first[0], first[0].replace(first[1], "200 0 0"), 1))
+    assert arm(tmp_path / "far.urdf", "tool0").n == 6
+
+
+def scaled(text, factor):
+    """A description whose lengths are in another unit."""
+    numbers = re.compile(r'xyz="([^"]*)"')
+    lines = re.sub(
+        r"<origin[^>]*>",
+        lambda tag: numbers.sub(
+            lambda xyz: f'xyz="{" ".join(str(factor * float(x)) for x in xyz[1].split())}"', tag[0]
+        ),
+        text,
+    )
+    assert lines != text
+    return lines

@@ -134,7 +134,7 @@ def test_a_record_keeps_every_sample_as_csv_does(tmp_path, panda):
     sent = samples(1000)
     logs = []
     for name in ("run.csv", "run.mcap"):
-        with Recorder(tmp_path / name, 7, panda.joint_names) as recorder:
+        with Recorder(tmp_path / name, 7, panda) as recorder:
             for sample in sent:
                 recorder.append(sample)
         logs.append(read_recording(tmp_path / name, panda))
@@ -153,11 +153,11 @@ def test_the_record_of_a_replay_has_the_log_s_own_date_and_not_that_of_the_repla
     rows = samples(2000)
     q, dq, tau = (np.array([sample[k] for sample in rows]) for k in (1, 2, 3))
     log = Recording(t + np.arange(2000) / 100.0, q, dq, tau, epoch=epoch)
-    with Replay(log, speed=None) as source, Recorder(tmp_path / "a.mcap", 7, panda.joint_names, source.epoch) as kept:
+    with Replay(log, speed=None) as source, Recorder(tmp_path / "a.mcap", 7, panda, source.epoch) as kept:
         kept.say("before any sample")
         for sample in source:
             kept.append(sample)
-    with Recorded(Replay(log, speed=None), tmp_path / "b.mcap", panda.joint_names) as source:
+    with Recorded(Replay(log, speed=None), tmp_path / "b.mcap", panda) as source:
         assert source.epoch == Steadied(Replay(log)).epoch
         for _ in source:
             pass
@@ -182,7 +182,7 @@ def test_a_log_that_is_replayed_in_a_process_of_its_own_keeps_its_date(tmp_path,
 
 
 def test_a_clock_that_starts_anew_starts_a_new_part(tmp_path, panda):
-    with Recorder(tmp_path / "run.mcap", 7, panda.joint_names) as recorder:
+    with Recorder(tmp_path / "run.mcap", 7, panda) as recorder:
         for sample in [*samples(3), *samples(4)]:
             recorder.append(sample)
     assert [path.name for path in recorder.paths] == ["run.mcap", "run.2.mcap"]
@@ -195,7 +195,7 @@ def test_a_clock_that_starts_anew_starts_a_new_part(tmp_path, panda):
 @pytest.mark.parametrize("kind", ["mcap", "csv"])
 def test_a_record_of_many_hours_is_in_files_of_six_of_which_each_is_whole(tmp_path, panda, kind):
     made = [sample._replace(t=1800.0 * k) for k, sample in enumerate(samples(30))]
-    with Recorder(tmp_path / f"run.{kind}", 7, panda.joint_names) as recorder:
+    with Recorder(tmp_path / f"run.{kind}", 7, panda) as recorder:
         for sample in made:
             recorder.append(sample)
     assert [path.name for path in recorder.paths] == [f"run{part}.{kind}" for part in ("", ".2", ".3")]
@@ -210,7 +210,7 @@ def test_a_record_of_many_hours_is_in_files_of_six_of_which_each_is_whole(tmp_pa
 def test_a_record_cut_anywhere_is_read_up_to_a_whole_chunk_and_says_so(tmp_path, panda):
     sent = samples(3000)
     whole = tmp_path / "whole.mcap"
-    with Recorder(whole, 7, panda.joint_names) as recorder:
+    with Recorder(whole, 7, panda) as recorder:
         for sample in sent:
             recorder.append(sample)
     data = whole.read_bytes()
@@ -263,12 +263,13 @@ def test_a_full_disk_is_said_and_leaves_whole_chunks(tmp_path, panda):
     code = """
 import resource, signal, sys
 import numpy as np
-from armload.devices import Recorded, Recorder, Replay, Steadied, open_source
+from armload.arms import arm
+from armload.devices import Recorder
 from armload.errors import RecordingError
 from armload.recording import Sample
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
-recorder = Recorder(sys.argv[1], 7, sys.argv[2:])
+recorder = Recorder(sys.argv[1], 7, arm("panda"))
 try:
     for k in range(20000):
         recorder.append(Sample(k * 1e-3, *np.random.default_rng(k).normal(size=(3, 7))))
@@ -277,7 +278,7 @@ except RecordingError as error:
 recorder.close()
 """
     path = tmp_path / "run.mcap"
-    words = [sys.executable, "-c", code, str(path), *panda.joint_names]
+    words = [sys.executable, "-c", code, str(path)]
     said = subprocess.run(words, capture_output=True, text=True, check=True, timeout=LIMIT).stdout
     assert "full" in said or "cannot be written" in said
     log = read_recording(path, panda)
@@ -288,7 +289,7 @@ recorder.close()
 def test_what_cannot_be_recorded_is_refused_before_the_first_sample(tmp_path, panda):
     (tmp_path / "run.mcap").write_text("mine")
     with pytest.raises(RecordingError, match="exists: a record is never written over"):
-        Recorder(tmp_path / "run.mcap", 7, panda.joint_names)
+        Recorder(tmp_path / "run.mcap", 7, panda)
     assert (tmp_path / "run.mcap").read_text() == "mine"
     with pytest.raises(RecordingError, match="knows joints by name: expected 7, found 0"):
         Recorder(tmp_path / "other.mcap", 7)
@@ -297,13 +298,13 @@ def test_what_cannot_be_recorded_is_refused_before_the_first_sample(tmp_path, pa
 
 
 @pytest.mark.parametrize("suffix", ["csv", "mcap"])
-def test_a_record_that_cannot_be_begun_leaves_no_file(tmp_path, suffix):
+def test_a_record_that_cannot_be_begun_leaves_no_file(tmp_path, panda, suffix):
     """A service that tries again every five seconds would leave one empty file after the other."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))  # as a full disk: no file can grow
     try:
         with pytest.raises(RecordingError):
-            Recorder(tmp_path / f"run.{suffix}", 7, [f"joint{k}" for k in range(7)])
+            Recorder(tmp_path / f"run.{suffix}", 7, panda)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert list(tmp_path.iterdir()) == []

@@ -227,12 +227,13 @@ def estimate(phi, std):
 
 SPREAD = np.array([0.02, *[0.002] * 3, *[0.002] * 6])
 BODY = example_payload().parameters.phi
+PANDA = arm("panda")
 
 
 def test_only_a_body_that_can_exist_is_announced():
-    assert np.array_equal(announced(estimate(BODY, SPREAD)).phi, BODY)
+    assert np.array_equal(announced(estimate(BODY, SPREAD), PANDA).phi, BODY)
     impossible = BODY - np.array([0, 0, 0, 0, 0.012, 0, 0, 0, 0, 0])  # Ixx below 0
-    body = announced(estimate(impossible, SPREAD))
+    body = announced(estimate(impossible, SPREAD), PANDA)
     assert is_consistent(body.phi)
     assert not is_consistent(impossible)
     assert body.mass == pytest.approx(BODY[0], abs=0.1)
@@ -251,7 +252,7 @@ def test_only_a_body_that_can_exist_is_announced():
     ids=["mass unknown", "nothing known", "no inertia", "not a number", "taken off"],
 )
 def test_what_is_not_known_is_not_announced(phi, std):
-    assert announced(estimate(phi, std)) is None
+    assert announced(estimate(phi, std), PANDA) is None
 
 
 def live(p_change=0.0, p_contact=0.0, settling=False):
@@ -261,15 +262,26 @@ def live(p_change=0.0, p_contact=0.0, settling=False):
 
 
 def test_a_live_answer_is_announced_while_nothing_passes_by():
-    assert np.array_equal(announced(live()).phi, BODY)
+    assert np.array_equal(announced(live(), PANDA).phi, BODY)
     for passing in ({"p_change": 0.6}, {"p_contact": 0.6}, {"settling": True}):
-        assert announced(live(**passing)) is None
+        assert announced(live(**passing), PANDA) is None
 
 
 def test_an_empty_hand_is_announced_as_nothing():
-    body = announced(estimate(0.02 * BODY, SPREAD))
+    body = announced(estimate(0.02 * BODY, SPREAD), PANDA)
     assert body.mass == 0.0
     assert not body.phi.any()
+
+
+@pytest.mark.parametrize("rated", [0.3, 3.0, 150.0], ids=["hobby", "cobot", "industrial"])
+def test_how_well_a_mass_is_to_be_known_to_be_announced_grows_with_what_the_arm_is_rated_for(rated):
+    """Else an empty arm of 150 kg is never announced as empty, and a tenth of a kilogram of a toy's always is."""
+    robot, light = replace(PANDA, rated_payload=rated), 0.02 * BODY[0] * rated / 3.0
+    for std, known in ((0.0499, True), (0.0501, False)):
+        body = announced(estimate([light, *[0.0] * 9], [std * rated, *SPREAD[1:]]), robot)
+        assert (body is not None and body.mass == 0.0) == known
+    heavy = 6.0 * rated / 3.0 * BODY / BODY[0]
+    assert announced(estimate(heavy, [0.09 * heavy[0], *SPREAD[1:]]), robot) is not None
 
 
 # ------------------------------------------------------------------ trajectories

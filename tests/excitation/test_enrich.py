@@ -33,9 +33,9 @@ def allowed(panda):
     return Constraints(panda, READY, share=1.0, payload=PayloadRange(2.0), travel=10.0, speed=5.0)
 
 
-def trajectory(panda, *seconds):
+def trajectory(panda, *seconds, joints=()):
     points = [{"positions": READY.tolist(), "time_from_start": {"sec": s}} for s in seconds]
-    return json.dumps({"joint_names": panda.joint_names, "points": points})
+    return json.dumps({"joint_names": [*panda.joint_names, *joints], "points": points})
 
 
 @pytest.mark.parametrize(
@@ -46,8 +46,18 @@ def trajectory(panda, *seconds):
         ("p.yaml", lambda _: "made: 2026-13-45", "is neither JSON nor YAML: month must be in"),
         ("p.yaml", lambda _: "[" * 100_000, "is neither JSON nor YAML"),
         ("p.csv", lambda _: "t,q1,q2,q3,q4,q5,q6,q7\n", "has a row that is not 8 numbers"),
+        ("p.csv", lambda _: f"t,q1,q2,q3,q4,q5,q6,q7,q1\n{'0,' * 8}0\n{'1,' * 8}1", "has 2 columns 'q1'"),
+        ("p.csv", lambda _: f"t,q1,q2,q3,q4,q5,q6,q7\n{'0,' * 7}0\n1e9,{'0,' * 6}0", "lasts 1e.09 s: expected 3600 s"),
+        ("p.json", lambda panda: trajectory(panda, 0, 10**9), "lasts 1e.09 s: expected 3600 s"),
+        ("p.json", lambda panda: trajectory(panda, 0, "2"), 'time_from_start holds "2": expected nothing but numbers'),
+        ("p.json", lambda panda: trajectory(panda, 0, 2).replace("0.8", '"0.8"', 1), 'positions holds "0.8"'),
+        ("p.json", lambda panda: trajectory(panda, 0, 2, joints=[5]), "names a joint 5: expected texts"),
+        ("p.json", lambda panda: trajectory(panda, 0, 2, joints=["panda_joint1"]), "panda_joint7, each once"),
     ],
-    ids=["at no time", "at a time too long", "no date", "too deep", "no row"],
+    ids=[
+        *("at no time", "at a time too long", "no date", "too deep", "no row", "a column twice", "a table of years"),
+        *("a trajectory of years", "a time as text", "an angle as text", "a joint without a name", "a joint twice"),
+    ],
 )
 def test_what_is_no_path_is_refused_in_a_sentence(panda, tmp_path, name, content, says):
     (tmp_path / name).write_text(content(panda))

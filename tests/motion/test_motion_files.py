@@ -16,6 +16,7 @@ from armload.motion import (
     export_motion,
     load_motion,
     random_motion,
+    save_motion,
     taie2024,
 )
 from armload.motion.motion_file import save_motions
@@ -140,6 +141,41 @@ def test_a_motion_file_whose_numbers_nobody_can_hold_is_refused_in_a_sentence(tm
     (tmp_path / "m.json").write_text(content)
     with pytest.raises(MotionError, match=r"m\.json( is not a motion)?: "):
         load_motion(tmp_path / "m.json")
+
+
+@pytest.mark.parametrize(
+    ("changed", "found"),
+    [
+        ({"period": "6"}, 'period holds "6"'),
+        ({"period": True}, "period holds true"),
+        ({"offset": ["0.5"] * 7}, 'offset holds "0.5"'),
+        ({"sine": [[0.0]] * 6 + [[None]]}, "sine holds null"),
+        ({"kind": "b-spline", "start": [0.0], "control": [[0.1, 0.2, 0.3]], "duration": "2"}, 'duration holds "2"'),
+        ({"kind": "path", "times": [0.0, "1"], **NUMBERS}, 'times holds "1"'),
+    ],
+    ids=["a text", "a truth", "angles as texts", "nothing", "of a spline", "of a path"],
+)
+def test_what_is_no_number_in_a_motion_file_is_named_and_not_read_as_one(tmp_path, changed, found):
+    content = {"format": "armload-motion-1", "name": "x", "period": 6.0, **AT_REST, **changed}
+    (tmp_path / "m.json").write_text(json.dumps(content))
+    with pytest.raises(MotionError, match=rf"m\.json: {found}: expected nothing but numbers$"):
+        load_motion(tmp_path / "m.json")
+
+
+@pytest.mark.parametrize("form", ["json", "csv"])
+def test_a_motion_of_more_than_an_hour_is_refused_by_its_time_and_not_by_the_memory_it_needs(tmp_path, form):
+    for seconds, name in ((3600.0, "hour"), (3601.0, "more")):
+        motion = PathMotion([0.0, seconds], *[np.zeros((2, 7))] * 3)
+        file = tmp_path / f"{name}.{form}"
+        if form == "json":
+            save_motion(file, motion)
+        else:
+            header = ",".join(["t", *(f"{kind}{j}" for kind in ("q", "dq", "ddq") for j in range(1, 8))])
+            file.write_text("\n".join([header, *(",".join([t, *["0"] * 21]) for t in ("0", str(seconds)))]))
+    read = load_motion if form == "json" else PathMotion.read
+    assert read(tmp_path / f"hour.{form}").duration == 3600.0
+    with pytest.raises(MotionError, match="lasts 3601 s: expected 3600 s at most; are these ms"):
+        read(tmp_path / f"more.{form}")
 
 
 def test_a_table_with_a_cell_that_no_reader_takes_is_refused_in_a_sentence(tmp_path):

@@ -530,6 +530,20 @@ def test_a_change_that_has_its_name_gets_its_mass_once_that_is_known():
     assert (naming.event.kind, naming.event.mass, naming.judging) == ("grasp", 0.4, False)
 
 
+@pytest.mark.parametrize(
+    ("rated", "said"),
+    [(0.02, "+0.0043 kg"), (3.0, "+0.64 kg"), (150.0, "+32.1 kg")],
+    ids=["toy", "cobot", "large"],
+)
+def test_the_mass_of_a_change_is_said_to_two_digits_of_what_it_is_known_to_by_what_the_arm_is_rated_for(rated, said):
+    naming, runs = Naming(), young_run(1e-3 * rated, step=0.2137 * rated)
+    runs.unit = 0.5 * rated
+    changed(naming)
+    naming.judge(runs, held=True)
+    assert str(naming.event) == f"grasp at 5.00 s: {said}"
+    assert naming.event.to_dict().keys() == {"kind", "t", "began", "mass"}
+
+
 def test_a_change_that_seemed_to_go_on_and_did_not_still_gets_its_name():
     naming = Naming()
     changed(naming)

@@ -47,6 +47,15 @@ def test_a_source_that_comes_again_is_said_to_whatever_is_unknown_then():
     assert seen == [("source_lost", True, "gone"), ("source_lost", False, "samples come again")]
 
 
+@pytest.mark.parametrize(
+    ("rated", "text"),
+    [(0.02, "0.0243 kg are held, 0.02 kg"), (3.0, "3.64 kg are held, 3 kg"), (150.0, "182.1 kg are held, 150 kg")],
+)
+def test_too_large_a_mass_is_said_to_the_digits_that_are_known_of_an_arm_of_that_rating(rated, text):
+    (alarm,) = told(Alarms("a", rating=rated), answer(1.2137 * rated), 1.0, 0.0)[0]
+    assert alarm.text == f"{text} are allowed"
+
+
 def test_a_limit_that_is_grazed_gives_one_alarm():
     alarms, now, seen = Alarms("a", rating=3.0), 0.0, []
     for k in range(20):

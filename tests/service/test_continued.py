@@ -208,7 +208,7 @@ def test_while_the_disk_is_full_the_last_state_stays_and_it_is_saved_again_once_
     about = [note for note in said if note is not None and "saved" in note]
     assert len(about) == 2
     assert "cannot be saved" in about[0]
-    assert "File too large" in about[0]
+    assert "File too large; the one saved before stays" in about[0]
     assert about[1] == "the state is saved again"
 
 

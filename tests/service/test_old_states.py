@@ -12,7 +12,7 @@ from armload.recording import write_recording
 from armload.runtime.atomic import kept_alone
 from armload.service import ArmSettings
 from armload.service.arm_process import ArmProcess
-from armload.service.old_states import OldStates
+from armload.service.old_states import OldStates, not_saved
 
 HOUR = 3600.0
 
@@ -103,3 +103,12 @@ def test_what_a_killed_process_left_of_other_settings_goes_away(settings):
     (other.parent / f".{other.name}.part0.npz").write_bytes(b"half")
     OldStates(settings.state, HOUR, lambda text: pytest.fail(text)).clear(0.0)
     assert list(other.parent.iterdir()) == []
+
+
+def test_a_state_that_cannot_be_saved_is_said_to_stay_only_where_one_was_saved_before(tmp_path):
+    path, full = tmp_path / "left.npz", OSError(28, "No space left on device")
+    assert not_saved(path, full) == (
+        f"the state cannot be saved in {path}: No space left on device; none was saved there before"
+    )
+    path.write_bytes(b"")
+    assert not_saved(path, full).endswith("No space left on device; the one saved before stays")

@@ -57,7 +57,7 @@ class Applying:
             raise UsageError(f"apply is {to!r}: expected one of {', '.join((*KINDS, MOVEIT))}")
         if auto and to == MOVEIT:
             raise UsageError("apply_auto is for a robot's controller: MoveIt is told on request")
-        self._auto, self._telling = auto, threading.Lock()
+        self._arm, self._auto, self._telling = arm, auto, threading.Lock()
         self._newest: _Answer | None = None
         self._scene: PlanningScene | None = None
         self._feedback: Feedback | None = None
@@ -103,7 +103,7 @@ class Applying:
         assert self._scene is not None
         answer, body = self._newest, None
         if answer is not None and answer.known and time.monotonic() - answer.at <= FRESH:
-            body = announced(answer.estimate)
+            body = announced(answer.estimate, self._arm)
         if body is None:
             return False, "the answer is unknown"
         self._scene.put(body)

@@ -206,7 +206,7 @@ class PayloadIdentifier(LifecycleNode):
 
     def _publish(self, stream: Stream, estimate: OnlineEstimate) -> None:
         known = stream.why_unknown() is None
-        body = announced(estimate) if known else None
+        body = announced(estimate, stream.arm) if known else None
         said = payload_message(estimate, stream.arm.name, self._states, body)
         self._measuring.take(said)
         if self._applying is not None and stream.sample is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from difflib import get_close_matches
-from math import isfinite
+from math import hypot, isfinite
 
 from armload.errors import ArmError
 
@@ -21,6 +21,10 @@ _NUMBERS = {
     "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
     "limit": ("lower", "upper", "effort", "velocity"),
 }
+# [m] from the first joint of an arm to its frame along the links, at most: almost three times the space station's arm
+# of 17.6 m, and a quarter of what an arm of 20 cm is in millimetres
+# (test_a_description_in_millimetres_is_refused_by_its_lengths)
+_LONGEST = 50.0
 _VECTORS = ("xyz", "rpy")  # of three numbers; every other attribute is one
 
 
@@ -55,7 +59,7 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     Raises:
         ArmError: not a URDF, no tree of links, no moving joint, an unknown frame, none named where several ends lie
             behind as many moving joints, a joint of the chain that mimics another, or numbers that no body or joint can
-            have.
+            have, lengths among them.
     """
     try:
         root = ET.fromstring(xml)
@@ -103,6 +107,7 @@ def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     if not moving:
         raise ArmError(f"no joint of {where} moves the frame {frame!r}: choose a frame behind the arm's joints")
     _check_moving(moving, frame, where)
+    _check_lengths(chain[chain.index(moving[0]) + 1 :], frame, where)
     for joint in joints.values():
         for mimic in joint.findall("mimic"):
             joint.remove(mimic)
@@ -232,6 +237,17 @@ def _check_moving(moving: list[ET.Element], frame: str, where: str) -> None:
                 f"{where}: <limit> of joint {joint.get('name')!r} has lower = {lower:g}, upper = {upper:g}, effort = "
                 f"{effort:g} and velocity = {velocity:g}, expected lower below upper and no negative limit"
             )
+
+
+def _check_lengths(joints: list[ET.Element], frame: str, where: str) -> None:
+    """Refuse lengths that no arm has; joints: those of the chain behind the first that moves."""
+    origins = [origin.get("xyz") or "" for joint in joints for origin in joint.findall("origin")]
+    length = sum(hypot(*(_numbers(xyz) or [])) for xyz in origins)
+    if length > _LONGEST:
+        raise ArmError(
+            f"the links of {where} are {length:.0f} m long together, from the first joint to {frame!r}: expected "
+            f"{_LONGEST:g} m at most, as a URDF is in metres; are these mm?"
+        )
 
 
 def _numbers(text: str) -> list[float] | None:

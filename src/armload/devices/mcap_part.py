@@ -15,13 +15,13 @@ the time of day at which that one came.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from armload.arms import Arm
 from armload.devices.ros2.announcement import announced
 from armload.devices.ros2.messages import message_of
 from armload.inertia import NAMES
@@ -46,15 +46,16 @@ class McapPart:
     """One file of a record; see `Recorder`.
 
     Args:
-        path: to write. joint_names: of the arm. epoch: of the source (`Source.epoch`); None: samples are of now.
+        path: to write. arm: whose joints and payload it is. epoch: of the source (`Source.epoch`); None: samples are of
+            now.
 
     Raises:
         RecordingError: it cannot be written.
     """
 
-    def __init__(self, path: Path, joint_names: Sequence[str], epoch: float | None = None) -> None:
+    def __init__(self, path: Path, arm: Arm, epoch: float | None = None) -> None:
         self._file = McapFile(path, TOPICS)
-        self._names = list(joint_names)
+        self._arm, self._names = arm, list(arm.joint_names)
         self._first: float | None = None
         self._of_log = epoch
         self._epoch = self._now = 0  # [ns]
@@ -74,7 +75,7 @@ class McapPart:
 
     def keep(self, estimate: OnlineEstimate) -> None:
         """What is said of the payload after the newest sample."""
-        body = announced(estimate)
+        body = announced(estimate, self._arm)
         if body is not None:
             rests_on = self._stamp(estimate.t - (estimate.age - estimate.lag))
             self._file.write(PAYLOAD, self._now, message_of(body, rests_on, _inertia))

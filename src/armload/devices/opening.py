@@ -113,7 +113,7 @@ def open_source(
     if record is None:
         return source
     try:
-        return Recorded(source, record, arm.joint_names)
+        return Recorded(source, record, arm)
     except BaseException:
         source.close()
         raise

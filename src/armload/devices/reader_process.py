@@ -127,7 +127,7 @@ class _Reader:
                 record = order["record"]
                 recorder = None
                 if record is not None:
-                    recorder = stack.enter_context(Recorder(record, source.n, arm.joint_names, source.epoch))
+                    recorder = stack.enter_context(Recorder(record, source.n, arm, source.epoch))
                 threading.Thread(target=self.watch, args=(source,), daemon=True).start()
                 about = {"name": source.name, "n": source.n, "rate": source.rate, "speed": source.speed}
                 self.report(event="ready", **about, notes=source.notes, epoch=source.epoch, paced=source.paced)

@@ -16,12 +16,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from armload.arms import Arm
 from armload.devices.mcap_part import McapPart
 from armload.devices.source import Source
 from armload.errors import RecordingError
@@ -41,7 +42,8 @@ class Recorder:
     Args:
         path: a `.csv` or `.mcap` file that does not exist yet, nor what may come beside it: nothing is ever written
             over.
-        n: joints. joint_names: of an MCAP. epoch: of the source; its stamps count from it.
+        n: joints. arm: an MCAP names its joints, and says what it holds. epoch: of the source; an MCAP's stamps count
+            from it.
 
     Attributes:
         kept: samples in the log, all its parts together.
@@ -52,15 +54,16 @@ class Recorder:
         RecordingError: the file exists, is neither, or cannot be written.
     """
 
-    def __init__(self, path: str | Path, n: int, joint_names: Sequence[str] = (), epoch: float | None = None) -> None:
+    def __init__(self, path: str | Path, n: int, arm: Arm | None = None, epoch: float | None = None) -> None:
         self.path = Path(path)
         if self.path.suffix.lower() not in RECORDS:
             raise RecordingError(
                 f"a record is written as CSV or MCAP: expected a name that ends in .csv or .mcap, found {self.path}"
             )
-        if self.path.suffix.lower() == ".mcap" and len(joint_names) != n:
-            raise RecordingError(f"{self.path}: an MCAP knows joints by name: expected {n}, found {len(joint_names)}")
-        self.n, self._names, self._epoch = n, joint_names, epoch
+        named = 0 if arm is None else arm.n
+        if self.path.suffix.lower() == ".mcap" and named != n:
+            raise RecordingError(f"{self.path}: an MCAP knows joints by name: expected {n}, found {named}")
+        self.n, self._arm, self._epoch = n, arm, epoch
         self.kept = 0
         self.bad = 0
         self.paths: list[Path] = []
@@ -121,7 +124,11 @@ class Recorder:
 
     def _next_part(self) -> _CsvPart | McapPart:
         path = _path_of_part(self.path, len(self.paths) + 1)
-        part = McapPart(path, self._names, self._epoch) if path.suffix.lower() == ".mcap" else _CsvPart(path, self.n)
+        if path.suffix.lower() == ".mcap":
+            assert self._arm is not None
+            part = McapPart(path, self._arm, self._epoch)
+        else:
+            part = _CsvPart(path, self.n)
         self.paths.append(path)
         return part
 
@@ -161,11 +168,11 @@ class Recorded(Source):
 
     Args:
         source: any source; closed with this one.
-        path, joint_names: of the log, see `Recorder`.
+        path, arm: of the log, see `Recorder`.
     """
 
-    def __init__(self, source: Source, path: str | Path, joint_names: Sequence[str] = ()) -> None:
-        self.recorder = Recorder(path, source.n, joint_names, source.epoch)
+    def __init__(self, source: Source, path: str | Path, arm: Arm | None = None) -> None:
+        self.recorder = Recorder(path, source.n, arm, source.epoch)
         self.source = source
         self.name, self.n, self.rate, self.speed = source.name, source.n, source.rate, source.speed
         self.notes, self.epoch = source.notes, source.epoch

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from armload.inertia import NAMES, UNITS, vech
+from armload.inertia import NAMES, UNITS, decimals, vech
 
 if TYPE_CHECKING:
     from armload.identification.answer import Identification
 
 _LOPSIDED = 0.1  # of the half-width, between the value and the middle of its interval: beyond, both ends are shown
-_MOST = 6  # decimals
 
 
 class Quantity(NamedTuple):
@@ -71,18 +68,18 @@ def shown(rows: Sequence[Quantity]) -> list[str]:
     ['0.10 [-0.20, 0.50]']
     """
     halves = [0.5 * (row.high - row.low) for row in rows]
-    decimals = max(_decimals(half) for half in halves)
+    digits = max(map(decimals, halves))
     signed = "+" if any(row.low < 0.0 for row in rows) and len(rows) > 1 else ""
 
     def number(x: float) -> str:
-        return f"{round(x, decimals) + 0.0:{signed}.{decimals}f}"  # no -0.0
+        return f"{round(x, digits) + 0.0:{signed}.{digits}f}"  # no -0.0
 
     values = [number(row.value) for row in rows]
     width, out = max(map(len, values)), []
     for row, half, value in zip(rows, halves, values, strict=True):
         lopsided = abs(row.value - 0.5 * (row.low + row.high)) > _LOPSIDED * half
         ends = f"[{number(row.low)}, {number(row.high)}]"
-        out.append(f"{value:>{width}} {ends if lopsided else f'± {half:.{decimals}f}'}")
+        out.append(f"{value:>{width}} {ends if lopsided else f'± {half:.{digits}f}'}")
     return out
 
 
@@ -160,7 +157,3 @@ def _each(part: list[Quantity]) -> list[str]:
     for unit in dict.fromkeys(row.unit for row in part):
         out += shown([row for row in part if row.unit == unit])
     return out
-
-
-def _decimals(half: float) -> int:
-    return _MOST if not half > 0.0 else int(np.clip(1 - np.floor(np.log10(half)), 0, _MOST))

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         held,
         held_probability,
     )
+    from armload.inertia.digits import decimals
     from armload.inertia.inexact import Inexact
     from armload.inertia.orders import ORDERS, from_order, to_order
     from armload.inertia.parameters import (
@@ -59,6 +60,7 @@ __all__ = [
     "Inexact",
     "com_interval",
     "com_to_phi",
+    "decimals",
     "determined",
     "distance_to_body",
     "frame_change_matrix",

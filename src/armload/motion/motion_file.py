@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armload.errors import MotionError
+from armload.motion.as_written import not_too_long, numbers
 from armload.motion.fourier import FourierMotion
 from armload.motion.motion import Motion
 from armload.runtime.atomic import replacing
@@ -51,7 +52,8 @@ def load_motion(path: str | Path) -> FourierMotion | SplineMotion | PathMotion:
     """The motion in a JSON file written by `save_motion`.
 
     Raises:
-        MotionError: the file is missing, not JSON, or not a motion; one sentence that names it.
+        MotionError: the file is missing, not JSON, not a motion, or one of more than an hour; one sentence that names
+            it.
     """
     path = Path(path)
     try:
@@ -114,9 +116,9 @@ def motion_to_json(motion: Motion) -> str:
             "PathMotion can be saved as JSON; use export_motion for a table"
         )
     lines = [f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
-    for key, numbers in parts.items():
-        rows = ",\n".join(f"    {json.dumps(row)}" for row in numbers.tolist()) if numbers.ndim == 2 else ""
-        lines.append(f'  "{key}": ' + (f"[\n{rows}\n  ]" if rows else json.dumps(numbers.tolist())))
+    for key, values in parts.items():
+        rows = ",\n".join(f"    {json.dumps(row)}" for row in values.tolist()) if values.ndim == 2 else ""
+        lines.append(f'  "{key}": ' + (f"[\n{rows}\n  ]" if rows else json.dumps(values.tolist())))
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
@@ -149,21 +151,26 @@ def _content(text: str, where: str) -> dict[str, Any]:
 
 
 def _fourier(content: dict[str, Any]) -> FourierMotion:
-    period = float(content["period"])
-    return FourierMotion(content["offset"], content["sine"], content["cosine"], period, *_called(content))
+    offset, sine, cosine, period = _numbers(content, "offset", "sine", "cosine", "period")
+    return FourierMotion(offset, sine, cosine, float(period), *_called(content))
 
 
 def _spline(content: dict[str, Any]) -> SplineMotion:
     from armload.motion.spline import SplineMotion
 
-    return SplineMotion(content["start"], content["control"], float(content["duration"]), *_called(content))
+    start, control, duration = _numbers(content, "start", "control", "duration")
+    return SplineMotion(start, control, float(duration), *_called(content))
 
 
 def _path(content: dict[str, Any]) -> PathMotion:
     from armload.motion.path import PathMotion
 
-    times, q, dq, ddq = (content[key] for key in ("times", "positions", "velocities", "accelerations"))
+    times, q, dq, ddq = _numbers(content, "times", "positions", "velocities", "accelerations")
     return PathMotion(times, q, dq, ddq, *_called(content))
+
+
+def _numbers(content: dict[str, Any], *keys: str) -> list[Any]:
+    return [numbers(content[key], key) for key in keys]
 
 
 def _called(content: dict[str, Any]) -> tuple[str, str]:
@@ -181,7 +188,7 @@ _KINDS: dict[str | None, tuple[Callable[[dict[str, Any]], Any], str]] = {
 def _made(content: dict[str, Any], where: str) -> FourierMotion | SplineMotion | PathMotion:
     make, expected = _KINDS[content.get("kind")]
     try:
-        return make(content)
+        return not_too_long(make(content))
     except KeyError as error:
         raise MotionError(f"{where} is not a complete motion: the key {error} is missing") from None
     except MotionError as error:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import MotionError
+from armload.motion.as_written import not_too_long
 from armload.motion.motion import Motion
 from armload.recording.templates import abridged
 from armload.runtime.real_numbers import own_reals
@@ -86,7 +87,7 @@ class PathMotion(Motion):
         """The table that `export_motion` writes as CSV: a header, then t, q1 … qn, dq1 … dqn, ddq1 … ddqn.
 
         Raises:
-            MotionError: the file is missing or is not such a table.
+            MotionError: the file is missing or is not such a table, or lasts more than an hour.
         """
         try:
             with open(path, newline="", encoding="utf-8-sig") as file:
@@ -96,13 +97,13 @@ class PathMotion(Motion):
             raise MotionError(f"motion file {path} cannot be read: {error.strerror}") from None
         except (ValueError, csv.Error):
             raise MotionError(f"motion file {path} is not a table of numbers under a header") from None
-        n = (len(header) - 1) // 3
         if not _is_header(header) or table.ndim != 2:
             raise MotionError(
                 f"motion file {path} has the columns {abridged(header)}: expected t, q1 …, dq1 …, ddq1 … as "
                 "`armload motion export --format csv` writes them; of a log, see `armload motion check`"
             )
-        return cls(table[:, 0], table[:, 1 : n + 1], table[:, n + 1 : 2 * n + 1], table[:, 2 * n + 1 :], str(path))
+        q, dq, ddq = np.split(table[:, 1:], 3, axis=1)
+        return not_too_long(cls(table[:, 0], q, dq, ddq, str(path)))
 
     @staticmethod
     def is_table(path: str | Path) -> bool:

@@ -5,9 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from armload.inertia import Z95
+from armload.inertia import Z95, decimals
 from armload.online.runs import Runs
-from armload.online.thresholds import KIND_FROM, KIND_LATEST, KIND_STD, RETURN_STD, RETURN_UNTIL, RETURN_WITHIN
+from armload.online.thresholds import (
+    KIND_FROM,
+    KIND_LATEST,
+    KIND_STD,
+    RETURN_STD,
+    RETURN_UNTIL,
+    RETURN_WITHIN,
+    STEP_STD,
+)
 from armload.posterior import PosteriorLeastSquares
 
 _KINDS = {(False, True): "grasp", (True, False): "release", (True, True): "swap", (False, False): "change"}
@@ -23,19 +31,26 @@ class Event:
     t: when it was noticed, on the stream's clock [s]. began: when it seems to have begun [s].
     mass: by how much the mass has changed [kg], below zero where something was put down, of a "return", too; None
         until it is known.
+    decimals: with which the mass is shown: two digits of the standard deviation with which it is told at most.
     """
 
     kind: str
     t: float
     began: float
     mass: float | None
+    decimals: int = 2
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return vars(self).copy()
+        return {"kind": self.kind, "t": self.t, "began": self.began, "mass": self.mass}
+
+    @property
+    def shown_mass(self) -> str:
+        """The change of mass with its sign and unit; "" until it is known."""
+        return "" if self.mass is None else f"{self.mass:+.{self.decimals}f} kg"
 
     def __str__(self) -> str:
-        return f"{self.kind} at {self.t:.2f} s" + ("" if self.mass is None else f": {self.mass:+.2f} kg")
+        return f"{self.kind} at {self.t:.2f} s" + (f": {self.shown_mass}" if self.shown_mass else "")
 
 
 class Naming:
@@ -83,9 +98,9 @@ class Naming:
         assert self.event is not None
         if self._rest:
             self.judging, self._unnamed, self._may_return = self._before
-            self._name(self.event.kind, runs.mass_step(self._ended))
+            self._name(self.event.kind, runs.mass_step(self._ended), runs)
         else:
-            self._name("return", 0.0)
+            self._name("return", 0.0, runs)
 
     def judge(self, runs: Runs, held: bool | None) -> bool:
         """Say what the change was once the new run can tell; whether that holds what the earlier run held.
@@ -98,18 +113,18 @@ class Naming:
             return False
         if self._may_return and runs.is_earlier():
             self.judging, self._recognised = False, True
-            self._name("return", runs.mass_step(self._ended, runs.earlier))
+            self._name("return", runs.mass_step(self._ended, runs.earlier), runs)
             return True
         self._may_return = stream.seconds <= RETURN_UNTIL
         tells = std <= KIND_STD or stream.seconds > KIND_LATEST or stream.stands
         if self._unnamed and held is not None and tells:
             self._unnamed = False
-            self._name(_KINDS[self._held, held], runs.mass_step(self._ended))
+            self._name(_KINDS[self._held, held], runs.mass_step(self._ended), runs)
         elif not self._unnamed and self.event.mass is None and (mass := runs.mass_step(self._ended)) is not None:
-            self._name(self.event.kind, mass)
+            self._name(self.event.kind, mass, runs)
         self.judging = self._may_return or self._unnamed or self.event.mass is None
         return False
 
-    def _name(self, kind: str, mass: float | None) -> None:
+    def _name(self, kind: str, mass: float | None, runs: Runs) -> None:
         assert self.event is not None
-        self.event = replace(self.event, kind=kind, mass=mass)
+        self.event = replace(self.event, kind=kind, mass=mass, decimals=decimals(STEP_STD * runs.unit))

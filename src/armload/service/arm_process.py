@@ -35,7 +35,7 @@ from armload.service.absence import Absence
 from armload.service.catching_up import CatchingUp
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
-from armload.service.old_states import OldStates
+from armload.service.old_states import OldStates, not_saved
 from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
 from armload.service.session import TICK, Session
@@ -251,9 +251,8 @@ class ArmProcess:
                 self.note("the state is saved again")
             self._kept, self._failed, self._newest = time.monotonic(), None, session.sample
         except (ArmloadError, OSError) as error:
-            why = error.strerror or str(error) if isinstance(error, OSError) else str(error)
-            if why != self._failed:
-                self.note(f"the state cannot be saved in {path}: {why}; the one saved before stays")
+            if (why := not_saved(path, error)) != self._failed:
+                self.note(why)
             self._failed = why
 
 

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from armload.errors import IdentificationError, UsageError
+from armload.errors import ArmloadError, IdentificationError, UsageError
 from armload.runtime.atomic import clear_left_over, kept_alone
 
 _DIGITS = 8  # of the digest of an arm's settings in the name of its state
@@ -45,6 +45,13 @@ def _digest(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     files = sorted(file for file in path.rglob("*") if file.is_file())
     return hashlib.sha256("".join(f"{file.relative_to(path)} {_digest(file)} " for file in files).encode()).hexdigest()
+
+
+def not_saved(path: Path, error: ArmloadError | OSError) -> str:
+    """Why a state is not saved in `path`, and whether one that was saved before is still there."""
+    why = error.strerror or str(error) if isinstance(error, OSError) else str(error)
+    stays = "the one saved before stays" if os.path.isfile(path) else "none was saved there before"
+    return f"the state cannot be saved in {path}: {why}; {stays}"
 
 
 class OldStates:

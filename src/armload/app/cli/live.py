@@ -194,7 +194,7 @@ def run(options: argparse.Namespace) -> int | None:
     for note in aged:
         _warn(note)
     with notes_aside(), Steadied(source) if options.steady else source as source:
-        recorder = Recorder(mcap, arm.n, arm.joint_names, source.epoch) if mcap else None
+        recorder = Recorder(mcap, arm.n, arm, source.epoch) if mcap else None
         more = {"known": known, "recorder": recorder, "tare_age": age}
         session = Session(source, arm, tare, options.method, _warn, profile, **more)
         try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,7 +80,7 @@ def print_profile(profile: Profile, motors: bool, arm: Arm | None = None) -> Non
     torque = heading("torque", slides).removeprefix("torque ")
     rows = table(f"from session to session, 1 sigma {torque}", "", *(f"joint {j + 1}" for j in range(n)))
     for name, values in (("offset", drift[0]), ("Coulomb friction", drift[1])):
-        rows.add_row(name, *(f"{x:.{decimals(values, 3)}f}" for x in values))
+        rows.add_row(name, *(f"{x:.{_decimals(values, 3)}f}" for x in values))
     if profile.gain is not None and profile.gain_std is not None:
         rows.add_row("torque sensor's gain", *(f"{1.0 + x:.3f}" for x in profile.gain))
         if profile.gain_joint_std is not None:
@@ -89,7 +88,7 @@ def print_profile(profile: Profile, motors: bool, arm: Arm | None = None) -> Non
         print(f"a known weight was hung on: the torque is known to {100 * profile.gain_std:.1f} %")
     console().print(rows)
     rows = table("sessions", "log", "time [s]", f"offsets {torque}", "misfit", "noise")
-    digits = decimals([x for session in profile.sessions for x in session.offset], 2)
+    digits = _decimals([x for session in profile.sessions for x in session.offset], 2)
     for session in profile.sessions:
         offsets = " ".join(f"{x:+.{digits}f}" for x in session.offset)
         name, time = _name(session), f"{session.duration:.0f}"
@@ -110,14 +109,16 @@ def print_profile(profile: Profile, motors: bool, arm: Arm | None = None) -> Non
         print_note(line)
 
 
-def decimals(values: Iterable[float], least: int) -> int:
+def _decimals(values: Iterable[float], least: int) -> int:
     """How many show two digits of the largest value, as of an arm of small servos; at least so many.
 
-    >>> decimals([-0.0042, 0.0006], 2), decimals([3.0, 0.1], 2)
+    >>> _decimals([-0.0042, 0.0006], 2), _decimals([3.0, 0.1], 2)
     (4, 2)
     """
+    from armload.inertia import decimals
+
     largest = max(map(abs, values), default=0.0)
-    return least if largest == 0.0 else max(least, 1 - floor(log10(largest)))
+    return least if largest == 0.0 else max(least, decimals(largest))
 
 
 def _name(session: SessionRecord) -> str:

@@ -212,7 +212,7 @@ def events(log: Iterable[Entry], most: int = 6) -> str:
 
 
 def _event(event: Event) -> str:
-    return event.kind + ("" if event.mass is None else f", {event.mass:+.2f} kg")
+    return event.kind + (f", {event.shown_mass}" if event.shown_mass else "")
 
 
 def stream(name: str, estimate: OnlineEstimate | None, lost: int = 0, reason: Unknown | None = None) -> str:

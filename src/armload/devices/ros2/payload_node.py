@@ -48,7 +48,7 @@ class PayloadNode:
             estimate = self._update(sample)
             if abs(estimate.t - last) < 0.999 * self._period:  # a clock that was set back counts as later
                 continue
-            body = announced(estimate)
+            body = announced(estimate, self._source.arm)
             if body is None:
                 continue
             last = estimate.t

@@ -41,7 +41,7 @@ class Ros2Source(Source):
         needs_velocities: whether a topic without them is refused: who moves the arm cannot wait for the positions'.
 
     Attributes:
-        connection: the node, for whoever has something to publish.
+        connection: the node, for whoever has something to publish. arm: as given.
 
     Raises:
         SourceError: no ROS 2, no such topic name, nothing to hear in time, joints or efforts missing; no velocities,
@@ -60,7 +60,7 @@ class Ros2Source(Source):
         needs_velocities: bool = False,
     ) -> None:
         self.name, self.n = topic, arm.n
-        self._arm, self._timeout, self._closed = arm, timeout, False
+        self.arm, self._timeout, self._closed = arm, timeout, False
         self._states = JointStates(arm, topic, effort, needs_velocities)
         self._received: deque[tuple[Any, int]] = deque(maxlen=SENSOR_DEPTH)
         self._receipt = Receipt()
@@ -173,7 +173,7 @@ class Ros2Source(Source):
 
     def silence(self, seconds: float) -> str:
         """What to say where no sample of the arm came for so many seconds."""
-        missing = [name for name in self._arm.joint_names if name not in self._states.others]
+        missing = [name for name in self.arm.joint_names if name not in self._states.others]
         if not self._states.others:
             return (
                 f"no joint states on {self.name} for {seconds:g} s: expected a publisher of "
@@ -183,5 +183,5 @@ class Ros2Source(Source):
         lacking = f"without {', '.join(missing)}" if missing else "that never come in one message"
         return (
             f"{self.name} had only the joints {found} for {seconds:g} s, {lacking}: expected all of "
-            f"{self._arm.name}'s; name the right robot or topic"
+            f"{self.arm.name}'s; name the right robot or topic"
         )

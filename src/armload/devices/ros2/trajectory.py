@@ -19,6 +19,7 @@ from armload.arms import Arm
 from armload.arms.units import unit_of
 from armload.errors import MotionError
 from armload.motion import Motion
+from armload.motion.as_written import not_too_long, shown
 
 _SAME_PLACE = 0.02  # [rad] a trajectory that begins at once may begin so far from where the arm is
 _AT_REST = 1e-3  # [rad/s]
@@ -118,9 +119,13 @@ def read_trajectory(
 
     Raises:
         MotionError: joints that are not the arm's, all of them once; no points; points that lack positions, go back in
-            time, begin elsewhere than the arm is or do not end at rest; a joint limit of position or velocity passed.
+            time, begin elsewhere than the arm is or do not end at rest; more than an hour; a joint limit of position or
+            velocity passed.
     """
     names = list(message.joint_names)
+    for name in names:
+        if not isinstance(name, str):
+            raise MotionError(f"the trajectory names a joint {shown(name)}: expected texts")
     if sorted(names) != sorted(arm.joint_names):
         raise MotionError(
             f"the trajectory moves {', '.join(names) or 'no joints'}: expected {', '.join(arm.joint_names)}, each once"
@@ -157,7 +162,7 @@ def read_trajectory(
             "point a time_from_start that lets the arm get there"
         )
     assert positions is not None
-    motion = TrajectoryMotion(times, positions, velocities, accelerations, start[1])
+    motion = not_too_long(TrajectoryMotion(times, positions, velocities, accelerations, start[1]))
     _check_limits(arm, motion)
     return motion
 

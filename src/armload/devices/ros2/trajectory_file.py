@@ -14,6 +14,7 @@ from armload.arms import Arm
 from armload.devices.ros2.trajectory import TrajectoryMotion, read_trajectory
 from armload.errors import MotionError, one_line
 from armload.motion import Motion, check_joints, load_motion
+from armload.motion.as_written import not_too_long, numbers
 
 
 def is_trajectory(name: str) -> bool:
@@ -75,7 +76,8 @@ def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
 
     def seconds(point: dict[str, Any]) -> float:
         at = point.get("time_from_start", {})
-        return float(at.get("sec", at.get("secs", 0))) + 1e-9 * float(at.get("nanosec", at.get("nsecs", 0)))
+        whole, rest = at.get("sec", at.get("secs", 0)), at.get("nanosec", at.get("nsecs", 0))
+        return float(numbers(whole, "time_from_start")) + 1e-9 * float(numbers(rest, "time_from_start"))
 
     try:
         points = content["points"]
@@ -83,12 +85,16 @@ def _trajectory(content: dict[str, Any], name: str, arm: Arm) -> Motion:
         made = []
         for point in points:
             whole, rest = divmod(round((seconds(point) - first) * 1e9), 10**9)
-            columns = {key: list(point.get(key) or []) for key in ("positions", "velocities", "accelerations")}
+            columns = {
+                key: list(numbers(point.get(key) or [], key)) for key in ("positions", "velocities", "accelerations")
+            }
             made.append(SimpleNamespace(time_from_start=SimpleNamespace(sec=whole, nanosec=rest), **columns))
         header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0))  # a file begins when it is run
         message = SimpleNamespace(header=header, joint_names=list(content["joint_names"]), points=made)
         order = [message.joint_names.index(joint) for joint in arm.joint_names]
         start = np.array(made[0].positions, dtype=float)[order]
+    except MotionError as error:
+        raise MotionError(f"{name}: {error}") from None
     except (KeyError, IndexError, TypeError, AttributeError, ValueError, OverflowError):
         raise MotionError(
             f"{name} is no JointTrajectory of {arm.name}: expected joint_names with {', '.join(arm.joint_names)}, and "
@@ -103,6 +109,9 @@ def _table(text: str, name: str, arm: Arm) -> Motion:
     header, *lines = [line for line in text.splitlines() if line.strip()] or [""]
     names = [cell.strip() for cell in header.split(",")]
     wanted = {kind: [f"{kind}{k + 1}" for k in range(arm.n)] for kind in ("q", "dq", "ddq")}
+    for column in ("t", *wanted["q"], *wanted["dq"], *wanted["ddq"]):
+        if names.count(column) > 1:
+            raise MotionError(f"{name} has {names.count(column)} columns {column!r}: expected one of each")
     if "t" not in names or any(column not in names for column in wanted["q"]) or f"q{arm.n + 1}" in names:
         raise MotionError(
             f"{name} has the columns {', '.join(names)}: expected t, q1 … q{arm.n} in s and rad, parted by commas"
@@ -119,10 +128,5 @@ def _table(text: str, name: str, arm: Arm) -> Motion:
         if all(column in names for column in columns)
     }
     velocities = found.get("dq")
-    return TrajectoryMotion(
-        t,
-        found["q"],
-        velocities,
-        None if velocities is None else found.get("ddq"),
-        name=Path(name).stem,
-    )
+    accelerations = None if velocities is None else found.get("ddq")
+    return not_too_long(TrajectoryMotion(t, found["q"], velocities, accelerations, name=Path(name).stem))
