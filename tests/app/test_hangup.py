@@ -111,6 +111,17 @@ def test_a_benchmark_that_is_ended_leaves_nothing_of_its_cluster(in_a_terminal, 
     assert not any(path.is_dir() for path in (tmp_path / "scratch").rglob("worker-*"))
 
 
+def test_processes_of_a_command_whose_terminal_is_closed_say_nothing(in_a_terminal, tmp_path):
+    process, _, noted, _ = in_a_terminal("benchmark", "--quick", "--out", tmp_path / "quick", "--jobs", "2")
+    noted("part 2 of 4")
+    time.sleep(2.0)  # they are there
+    os.killpg(process.pid, signal.SIGHUP)  # as a shell passes it on
+    assert process.wait(60.0) == 130
+    assert in_a_terminal.noted()[-1] == "armload: interrupted"
+    time.sleep(1.0)  # what watches over their resources ends last
+    assert all(line.startswith("armload: ") for line in in_a_terminal.noted())
+
+
 def test_a_service_whose_terminal_is_closed_saves_and_ends(in_a_terminal, tmp_path):
     process, hang_up, _, said = in_a_terminal("serve", "sim", "--method", "map", "--save", tmp_path / "state")
     said('"known": true')

@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -191,6 +192,16 @@ def test_processes_end_with_the_one_that_began_them(tmp_path):
     while any(map(running, others)) and time.monotonic() < until:
         time.sleep(0.1)
     assert not any(map(running, others))
+
+
+def test_nor_does_a_process_stay_that_has_never_had_a_task(tmp_path):
+    (tmp_path / "spread.py").write_text(SPREAD.replace("range(2)", "range(1)"), encoding="utf-8")
+    with subprocess.Popen([sys.executable, "spread.py"], cwd=tmp_path, stdout=subprocess.PIPE) as begun:
+        begun.stdout.readline()
+        begun.kill()
+        # whoever holds its output is one of its processes
+        assert select.select([begun.stdout], [], [], 30.0)[0]
+        assert begun.stdout.read() == b""
 
 
 def test_what_a_kill_leaves_of_a_file_is_no_cell(tmp_path):

@@ -4,7 +4,7 @@ No scheduler or queue of our own: joblib or Dask gives out tasks one by one; wha
 A process that is killed costs the tasks that were running: they are given out again, at last each alone. Dask is asked
 itself, as joblib's backend for it keeps the number of workers that there were at first, runs everything here where
 that was one, and waits for ever for a scheduler that is gone. Processes of joblib end with the one that began them,
-which joblib leaves open: they would finish their tasks beside those of whoever goes on, and then wait for minutes.
+which joblib leaves open: they would finish their tasks beside those of whoever goes on, and wait for minutes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from typing import Any, TypeVar
 
 from armload.errors import ClusterError, UsageError
@@ -91,6 +91,7 @@ class Engine:
 
         parallel: Any = Parallel  # its annotations are narrower than what it takes
         how: dict[str, Any] = {"pre_dispatch": jobs, "batch_size": 1, "return_as": "generator_unordered"}
+        how |= {"initializer": _end_with, "initargs": (os.getpid(),)}  # not with its first task: some never get one
         with warnings.catch_warnings():
             # joblib says so when a process of its pool has ended; what was lost is given out again
             warnings.filterwarnings("ignore", message=".*A worker stopped while some jobs were given.*")
@@ -98,7 +99,7 @@ class Engine:
             warnings.filterwarnings("ignore", message=".*adjusting the input task iterator.*")
             with ExitStack() as stack:
                 with unheard_by_processes():  # begins them
-                    found = parallel(n_jobs=jobs, **how)(delayed(_with_item)(os.getpid(), work, item) for item in items)
+                    found = parallel(n_jobs=jobs, **how)(delayed(_with_item)(work, item) for item in items)
                     stack.callback(found.close)
                 yield from found
 
@@ -249,15 +250,12 @@ def _end_processes() -> None:
         pool.shutdown(kill_workers=True)
 
 
-def _with_item(parent: int, work: Callable[[T], R], item: T) -> tuple[T, R]:
-    if os.getpid() != parent:
-        _end_with(parent)
+def _with_item(work: Callable[[T], R], item: T) -> tuple[T, R]:
     return item, work(item)
 
 
-@cache
 def _end_with(parent: int) -> None:
-    """End this process once the one that began it has ended, whatever it is doing."""
+    """End this process once the one that began it has ended, whatever it is doing, or waiting for."""
 
     def look() -> None:
         while os.getppid() == parent:

@@ -51,16 +51,17 @@ def held_back() -> Iterator[Interruption]:
 
 @contextmanager
 def unheard_by_processes() -> Iterator[None]:
-    """Within, processes and threads that are begun never hear Ctrl-C; whoever begins them hears it at the end.
+    """Within, processes and threads that are begun never hear Ctrl-C, nor SIGHUP; whoever begins them does at the end.
 
-    A terminal sends it to every process of a command. The first of them ends the others, which would only print where
-    each of them was.
+    A terminal sends them to every process of a command. The first of them ends the others, which would only print where
+    each of them was; and the trackers of their resources, which are to outlive them, would be missed.
     """
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # it unblocks the signal where it is begun
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
+        resource_tracker.ensure_running()  # it unblocks Ctrl-C where it is begun
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
