@@ -18,6 +18,7 @@ from armload.service import ArmSettings
 from armload.service.arm_process import ArmProcess
 from armload.service.spare import Spare, order
 
+DAY = 86400.0  # [s]
 PATIENCE = 120.0  # [s]
 
 
@@ -228,3 +229,22 @@ def test_how_long_ago_a_state_was_saved_does_not_change_with_the_clock(panda, an
             process._say(None, None)
         before, after = (line["saved"] for line in said[-2:])
         assert 0.0 <= before <= after < before + 3600.0
+
+
+@pytest.mark.parametrize(
+    ("source", "said", "age"),
+    [("sim", None, 20.0 * DAY), ("sim", 3.0 * DAY, 23.0 * DAY), ("run.csv", 3.0 * DAY, 3.0 * DAY)],
+)
+def test_a_process_that_begins_anew_after_weeks_has_a_tare_of_weeks(
+    source, said, age, panda, analytic_log, tmp_path, monkeypatch
+):
+    """Of the service's session, or as old when that began; a replay begins its log anew."""
+    monkeypatch.chdir(tmp_path)
+    write_recording("run.csv", analytic_log(panda, test_payload().parameters, duration=2.0))
+    write_recording("empty.csv", analytic_log(panda, duration=3.0))
+    settings = ArmSettings(name="left", source=source, robot="panda", method="map", tare="empty.csv", tare_age=said)
+    process = ArmProcess(settings, 0.1, since=20.0 * DAY)
+    session = process._made_session()
+    assert session.tare.age == pytest.approx(age)
+    session.close()
+    process.source.close()

@@ -371,6 +371,19 @@ def test_an_error_ends_a_service_only_if_an_arm_cannot_begin(monkeypatch, stoppe
     assert how == ("ended: no such thing" if answered else None)
 
 
+def test_a_process_is_told_for_how_long_its_service_has_run(monkeypatch):
+    settings = ServiceSettings((ArmSettings("panda", name="left", source="sim"),))
+    service = Service(settings)
+    service._began -= 3600.0
+    echo = subprocess.Popen(["cat"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    monkeypatch.setattr(service._spare, "take", lambda: echo)
+    with service._started(settings.arms[0]) as process:
+        said = json.loads(process.stdout.readline())
+        process.stdin.close()
+    service.close()
+    assert 3600.0 <= said["since"] < 3700.0
+
+
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
 @pytest.mark.full  # some seconds
 def test_a_full_disk_under_its_output_ends_no_service(cell, stream):

@@ -45,21 +45,24 @@ def drift_since(tare: Recording, recording: Recording, age: float | None) -> tup
     return 0.0, ()
 
 
-def age_of(tare: Recording | None, began: float | None, age: float | None) -> tuple[float, tuple[str, ...]]:
+def age_of(
+    tare: Recording | None, began: float | None, age: float | None, since: float = 0.0
+) -> tuple[float, tuple[str, ...]]:
     """How old the tare of a log or stream is [s], and what is to be said of it.
 
     Args:
         began: when the log or stream did [s since 1970]; None: nobody knows.
         age: [s] as the user says; None: the tare's clock tells, if it shows the time of day, else it is of the same
             session.
+        since: [s] between that session, or when the user said so, and the beginning.
 
     Raises:
         IdentificationError: an age that is no time.
     """
     if age is not None:
-        return checked_age(age), ()
+        return checked_age(age) + since, ()
     if tare is None or tare.date is None or began is None:
-        return 0.0, ()
+        return since, ()
     seconds = abs(began - tare.date - tare.duration)
     told, since = f"is {in_words(seconds)} old", "since"
     if began < tare.date:

@@ -52,10 +52,10 @@ class ArmProcess:
 
     Args:
         settings: of the arm. every: [s] between two lines of the service, which leaves out some above `TICK`.
-        readers: that were started ahead.
+        readers: that were started ahead. since: [s] for which the service has run, its processes together.
     """
 
-    def __init__(self, settings: ArmSettings, every: float, readers: Sequence[Reader] = ()) -> None:
+    def __init__(self, settings: ArmSettings, every: float, readers: Sequence[Reader] = (), since: float = 0.0) -> None:
         # alarms, and whoever asks the endpoint, need to know at any moment
         self.settings, self.every, self._reader = settings, min(every, TICK), None
         self._state = settings.state  # of the files as they are now: one written anew is not what the stream goes by
@@ -66,6 +66,7 @@ class ArmProcess:
         self._failed: str | None = None  # why it could not be saved
         self._newest: Sample | None = None  # that the state saved last is of
         self._line, self._late = threading.Lock(), CatchingUp()
+        self._since = 0.0 if settings.replays else since  # what its tare has, as every replay begins its log anew
         self.arm = self._made_arm()
         for reader in readers:
             if reader.ring.columns == columns_of(self.arm.n):
@@ -207,7 +208,8 @@ class ArmProcess:
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
         if tare is not None and settings.replays:
             check_own_measurements(read_recording(settings.source, self.arm), tare)
-        age, aged = age_of(tare, time.time() if "://" in settings.source else None, settings.tare_age)
+        began = time.time() if "://" in settings.source else None
+        age, aged = age_of(tare, began, settings.tare_age, self._since)
         for note in aged if identifier is None else ():  # a state that goes on has its tare's age
             self.note(note)
         source = Steadied(self.source) if settings.steady else self.source
@@ -272,7 +274,7 @@ def main() -> None:
             order = json.loads(line)
         facts = order["arm"]
         facts["gravity"] = None if facts["gravity"] is None else tuple(facts["gravity"])
-        process = ArmProcess(ArmSettings(**facts), order["every"], readers)
+        process = ArmProcess(ArmSettings(**facts), order["every"], readers, order.get("since", 0.0))
 
         def listen() -> None:
             while os.read(0, 1 << 12):

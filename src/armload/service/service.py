@@ -51,6 +51,7 @@ class Service:
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self._alarms = {a.name: Alarms(a.name, _rating(a), a.com_range) for a in settings.arms}
         self._answers = {a.name: _starting(a) for a in settings.arms}
+        self._began = time.monotonic()
         self._lines = dict.fromkeys(self.names, -math.inf)  # when the last line of each was of [s, monotonic]
         self._heard = dict.fromkeys(self.names, time.monotonic())
         self._noted = dict.fromkeys(self.names, "")  # the last sentence of each
@@ -166,7 +167,8 @@ class Service:
 
     def _started(self, settings: ArmSettings) -> subprocess.Popen[bytes]:
         process = self.processes[settings.name] = self._spare.take()
-        order(process, {"arm": settings.to_dict(), "every": self.settings.every})
+        since = time.monotonic() - self._began
+        order(process, {"arm": settings.to_dict(), "every": self.settings.every, "since": since})
         if self._gone.is_set():
             _hang_up(process)
         return process
