@@ -64,10 +64,10 @@ def age_of(
     if tare is None or tare.date is None or began is None:
         return since, ()
     seconds = abs(began - tare.date - tare.duration)
-    told, since = f"is {in_words(seconds)} old", "since"
+    told, when = f"is {in_words(seconds)} old", "since"
     if began < tare.date:
-        told, since = f"was recorded {in_words(seconds)} after what it is the tare of", "in between"
-    note = f"by the logs' clocks the tare {told}: offsets and friction may have changed {since}"
+        told, when = f"was recorded {in_words(seconds)} after what it is the tare of", "in between"
+    note = f"by the logs' clocks the tare {told}: offsets and friction may have changed {when}"
     return seconds, (note,) if drift_after(seconds) else ()
 
 
