@@ -61,7 +61,10 @@ class SimulatedArm:
         return not self.speed.any()
 
     def step(self):
-        """One control cycle: q, dq and tau (n,) at its end, as sensors show them."""
+        """One control cycle: q and dq (n,) at its end, and tau (n,), which is its mean, as sensors show them.
+
+        What is commanded is held for the cycle, so that the torque falls within it as the arm goes on.
+        """
         if self.halting:
             lost = DECELERATION * self.cycle
             self.speed = np.sign(self.speed) * np.maximum(np.abs(self.speed) - lost, 0.0)
@@ -69,8 +72,10 @@ class SimulatedArm:
         forward = self.robot.torque(self.target)
         control = forward + self.gains.stiffness * self.target + self.gains.damping * self.speed
         self.data.ctrl[:] = control
-        for _ in range(round(self.cycle / STEP)):
-            before = self.data.qpos.copy()
-            mujoco.mj_step(self.model, self.data)  # its springs act where the step begins, its damping where it ends
-        dq = self.data.qvel.copy()
-        return self.data.qpos.copy(), dq, control - self.gains.stiffness * before - self.gains.damping * dq
+        springs = dampers = np.zeros(self.robot.n)
+        steps = round(self.cycle / STEP)
+        for _ in range(steps):
+            springs = springs + self.gains.stiffness * self.data.qpos  # act where a step begins
+            mujoco.mj_step(self.model, self.data)
+            dampers = dampers + self.gains.damping * self.data.qvel  # act where it ends
+        return self.data.qpos.copy(), self.data.qvel.copy(), control - (springs + dampers) / steps
