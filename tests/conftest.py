@@ -1,5 +1,6 @@
 """Shared fixtures: the arms, and the folder of real logs where there is one."""
 
+import gc
 import os
 import time
 from pathlib import Path
@@ -54,6 +55,14 @@ FIRST = (
     "measuring/test_measuring.py",
 )
 TESTS = Path(__file__).resolve().parent
+
+# All that is imported and found is there to stay: to search it for garbage again and again costs a third.
+gc.disable()
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items):

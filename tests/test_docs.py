@@ -4,6 +4,7 @@ import ast
 import contextlib
 import doctest
 import importlib
+import inspect
 import io
 import pkgutil
 import re
@@ -153,8 +154,9 @@ def test_the_theory_page_names_functions_and_tests_that_exist():
 def test_examples_in_docstrings_are_right(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     flags, results = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE, {}
-    for name in MODULES:
-        results[name] = doctest.testmod(importlib.import_module(name), optionflags=flags)  # prints what differs
+    for module in map(importlib.import_module, MODULES):
+        if ">>>" in inspect.getsource(module):  # to look through each object of the others takes seconds
+            results[module.__name__] = doctest.testmod(module, optionflags=flags)  # prints what differs
     assert [name for name, result in results.items() if result.failed] == []
     assert sum(result.attempted for result in results.values()) > 100
 

@@ -1,5 +1,7 @@
 """Networks over windows: what each architecture is, that bags learn, and that the seed decides everything."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -20,26 +22,27 @@ def windows():
 
 @pytest.fixture(scope="module")
 def bags(windows):
-    return {name: WindowNetworks(name, **SMALL, learning_rate=1e-2).fit(*windows) for name in ARCHITECTURES}
+    """A trained bag of an architecture, by its name; one that nobody asks for is not trained."""
+    return cache(lambda name: WindowNetworks(name, **SMALL, learning_rate=1e-2).fit(*windows))
 
 
 @pytest.mark.parametrize("architecture", ARCHITECTURES)
 @pytest.mark.full  # some seconds
 def test_every_architecture_learns_more_than_the_mean(bags, windows, architecture):
     X, y = windows
-    error = np.abs(bags[architecture].predict(X) - y).mean(axis=0)
+    error = np.abs(bags(architecture).predict(X) - y).mean(axis=0)
     assert error[0] < 0.75 * np.abs(y - y.mean(axis=0)).mean(axis=0)[0]
 
 
 def test_the_same_seed_gives_the_same_bag_and_another_seed_another(bags, windows):
     X, y = windows
     same, other = (WindowNetworks("conv", **SMALL, learning_rate=1e-2, seed=s).fit(X, y) for s in (0, 1))
-    np.testing.assert_array_equal(same.predict(X), bags["conv"].predict(X))
+    np.testing.assert_array_equal(same.predict(X), bags("conv").predict(X))
     assert np.abs(other.predict(X) - same.predict(X)).max() > 0.0
 
 
 def test_members_see_their_own_draw_and_the_answer_is_their_mean(bags, windows):
-    bag, X = bags["gru"], windows[0][:5]
+    bag, X = bags("gru"), windows[0][:5]
     each = np.asarray(_functions("gru")[2](bag.weights_, bag._scaled(X)), dtype=float)
     assert np.abs(each[0] - each[1]).max() > 0.0
     np.testing.assert_allclose(bag.predict(X), bag.y_mean_ + bag.y_scale_ * each.mean(axis=0), rtol=1e-6)
@@ -49,7 +52,7 @@ def test_units_of_inputs_and_outputs_do_not_matter(windows, bags):
     X, y = windows
     units, outputs = np.array([1e3, 1e-3, 5.0]), np.array([2.0, 1e4])
     scaled = WindowNetworks("conv", **SMALL, learning_rate=1e-2).fit(X * units + 7.0, y * outputs - 3.0)
-    np.testing.assert_allclose((scaled.predict(X * units + 7.0) + 3.0) / outputs, bags["conv"].predict(X), rtol=0.05)
+    np.testing.assert_allclose((scaled.predict(X * units + 7.0) + 3.0) / outputs, bags("conv").predict(X), rtol=0.05)
 
 
 def test_a_gated_recurrent_unit_is_that_of_its_equations():
@@ -72,7 +75,7 @@ def test_a_gated_recurrent_unit_is_that_of_its_equations():
 
 
 def test_a_convolution_answers_alike_wherever_in_a_window_something_happens(bags):
-    answer, p = _functions("conv")[2], bags["conv"].weights_
+    answer, p = _functions("conv")[2], bags("conv").weights_
     still = np.zeros((1, 61, 3), np.float32)
     moved = still.copy()
     moved[0, 30] = 5.0

@@ -133,6 +133,7 @@ def test_a_design_tells_more_than_random_motions_about_the_same_pose(panda, desi
         assert value > -np.linalg.slogdet(other.covariance[-1])[1] + 3.0
 
 
+@pytest.mark.full  # a whole design takes some seconds
 def test_a_clearance_a_millimetre_short_does_not_cost_most_of_the_motion():
     """Smaller motions of this one are not farther from what it nearly touches: drawn together it kept a fifth."""
     limits = Constraints(arm("ur5e"), np.array([0.0, -1.2, 1.5, -1.5, -1.57, 0.0]))

@@ -115,6 +115,7 @@ def test_a_change_whose_jerk_is_soon_too_large_keeps_most_of_its_room():
     assert 4.5e-3 < found.distance <= 5e-3
 
 
+@pytest.mark.full  # some seconds
 def test_a_quick_change_that_does_not_pass_is_made_smaller_and_not_looked_for_further():
     ur, home = arm("ur10e"), np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
     low, high, over = home + np.array([[0.0, 0.15, 0, 0, 0, 0], [-0.4, 0, 0, 0, 0, 0], [-0.8, 0, 0, 0, 0, 0.6]])

@@ -40,8 +40,15 @@ def times(log: Recording, factor: float) -> Recording:
     return replace(log, tau=factor * log.tau)
 
 
-@pytest.mark.parametrize("factor", [POUND_FEET, 1.3])
-@pytest.mark.parametrize("name", ["panda", "fr3"])
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [
+        ("panda", POUND_FEET),
+        ("fr3", 1.3),
+        pytest.param("panda", 1.3, marks=pytest.mark.full),
+        pytest.param("fr3", POUND_FEET, marks=pytest.mark.full),
+    ],
+)
 def test_torques_in_another_unit_are_told_by_the_links_that_they_carry(name, factor):
     log, tare = (times(one, factor) for one in recorded(name, 700))
     for before in (None, tare):

@@ -13,7 +13,7 @@ from armload.devices import Simulator
 from armload.errors import RecordingError
 from armload.identification import check_gravity_was_missing, check_plausible
 from armload.identification.exchanged import check_for_exchanged_torques
-from armload.identification.torque_scale import torque_scale
+from armload.identification.torque_scale import torque_scale, torque_scales
 from armload.inertia import InertialParameters
 from armload.lab.episodes import draw_episodes
 from armload.motion import random_motion, taie2024
@@ -319,6 +319,16 @@ def test_exchanged_torque_columns_of_a_real_log_are_named(wrong, name, pair):
     order[[pair[0] - 1, pair[1] - 1]] = pair[1] - 1, pair[0] - 1
     with pytest.raises(RecordingError, match=rf"tau{pair[0]} and tau{pair[1]} seem to be exchanged .*exchange them"):
         check_plausible(replace(log, tau=log.tau[:, order]), robot)
+
+
+def test_torques_exchanged_fit_as_the_log_with_them_exchanged_does(wrong):
+    """What is computed once for all pairs is nothing of tau."""
+    for robot, log in (wrong["panda"], wrong["ur10e loaded"]):
+        orders = [[1, 0, *range(2, robot.n)], list(range(robot.n))[::-1]]
+        logs = [replace(log, tau=log.tau[:, order]) for order in orders]
+        assert torque_scales(log, robot, orders) == [torque_scale(other, robot) for other in logs]
+        assert torque_scales(log, robot, orders, 24) == [torque_scale(other, robot, most=24) for other in logs]
+        assert torque_scales(log.select(slice(2)), robot, orders) == [None, None]
 
 
 @pytest.mark.parametrize("whole", [False, True])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import lru_cache
 from math import hypot, isfinite
 
 from armload.errors import ArmError
@@ -45,6 +46,7 @@ class Chain:
     held: tuple[tuple[str, int], ...]
 
 
+@lru_cache(maxsize=16)  # an arm with another payload or gravity asks for the same
 def read_chain(xml: str, frame: str | None, where: str) -> Chain:
     """The serial chain of a URDF that carries `frame`; every joint off the chain (fingers, say) is fixed at zero.
 

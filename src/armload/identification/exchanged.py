@@ -7,9 +7,8 @@ whole, and the other way round: of both, what explains the log best is named.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -25,7 +24,7 @@ from armload.identification.thresholds import (
     SWAPPED_MISFIT,
     SWAPPED_SHARE,
 )
-from armload.identification.torque_scale import FEW_WINDOWS, TorqueScale, torque_scale
+from armload.identification.torque_scale import FEW_WINDOWS, MOST_WINDOWS, TorqueScale, torque_scale, torque_scales
 from armload.recording import Recording
 
 
@@ -49,7 +48,7 @@ def check_for_exchanged_torques(recording: Recording, arm: Arm, seen: TorqueScal
     """
     if seen.misfit < SWAPPED_MISFIT:
         return
-    fits = _fits(recording, arm, _torques_exchanged)
+    fits = _torque_fits(recording, arm, MOST_WINDOWS)
     if not fits:
         return
     fit, i, j = min(fits, key=lambda found: found[0].misfit)
@@ -75,7 +74,7 @@ def check_for_exchanged_joints(recording: Recording, arm: Arm) -> None:
     seen = None if recording.joint_names is not None else torque_scale(recording, arm, most=FEW_WINDOWS)
     if seen is None or seen.evidence > -JOINTS_EXCHANGED:  # no evidence is far above 0
         return
-    fits = _fits(recording, arm, _joints_exchanged, partial(torque_scale, most=FEW_WINDOWS))
+    fits = _joint_fits(recording, arm)
     found = [_Exchange(*fitted, True) for fitted in fits if fitted[0].misfit <= MODEL_MISFIT]
     most = max(found, key=lambda exchange: exchange.fit.evidence, default=None)
     if most is None or most.fit.evidence < seen.evidence + JOINTS_EXCHANGED:
@@ -95,9 +94,9 @@ def _likeliest(recording: Recording, arm: Arm) -> _Exchange | None:
 
     Of a log that names its joints, torques alone.
     """
-    ways = ((_torques_exchanged, False), (_joints_exchanged, True))[: 1 if recording.joint_names is not None else 2]
-    few = partial(torque_scale, most=FEW_WINDOWS)
-    found = [_Exchange(*fitted, whole) for way, whole in ways for fitted in _fits(recording, arm, way, few)]
+    found = [_Exchange(*fitted, False) for fitted in _torque_fits(recording, arm, FEW_WINDOWS)]
+    if recording.joint_names is None:
+        found += [_Exchange(*fitted, True) for fitted in _joint_fits(recording, arm)]
     return max(found, key=lambda exchange: exchange.fit.evidence, default=None)
 
 
@@ -128,16 +127,22 @@ def _with_gears_too(recording: Recording, other: Recording, arm: Arm) -> bool:
     return exchanged.evidence > as_it_is.evidence + EXCHANGED_BY_GEARS
 
 
-def _fits(
-    recording: Recording,
-    arm: Arm,
-    exchanged: Callable[[Recording, int, int], Recording],
-    fitted: Callable[[Recording, Arm], TorqueScale | None] = torque_scale,
-) -> list[tuple[TorqueScale, int, int]]:
-    """How the log fits with each pair exchanged, where that is not surely wrong."""
-    pairs = combinations(range(recording.n), 2)
-    fits = [(fitted(exchanged(recording, i, j), arm), i, j) for i, j in pairs]
-    return [(fit, i, j) for fit, i, j in fits if fit is not None and not fit.is_wrong]
+def _torque_fits(recording: Recording, arm: Arm, most: int) -> list[tuple[TorqueScale, int, int]]:
+    """How the log fits with the torques of each pair exchanged, where that is not surely wrong."""
+    pairs = list(combinations(range(recording.n), 2))
+    orders = [_order(recording.n, i, j) for i, j in pairs]
+    return _not_wrong(torque_scales(recording, arm, orders, most), pairs)
+
+
+def _joint_fits(recording: Recording, arm: Arm) -> list[tuple[TorqueScale, int, int]]:
+    """How the log fits with each pair of joints exchanged, where that is not surely wrong, of `FEW_WINDOWS` windows."""
+    pairs = list(combinations(range(recording.n), 2))
+    others = (_joints_exchanged(recording, i, j) for i, j in pairs)
+    return _not_wrong([torque_scale(other, arm, most=FEW_WINDOWS) for other in others], pairs)
+
+
+def _not_wrong(fits: list[TorqueScale | None], pairs: list[tuple[int, int]]) -> list[tuple[TorqueScale, int, int]]:
+    return [(fit, i, j) for fit, (i, j) in zip(fits, pairs, strict=True) if fit is not None and not fit.is_wrong]
 
 
 def _torques_exchanged(recording: Recording, i: int, j: int) -> Recording:

@@ -31,7 +31,7 @@ both among the unknowns (`gears`). The first question is asked without them, as 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +52,7 @@ from armload.recording import Recording
 from armload.recording.windows import Windows, integrals, windows
 from armload.regression.prior import payload_size, within_reach
 
-_MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
+MOST_WINDOWS = 120  # spread over the log: one factor needs no more, whatever the log's length
 # as many as a log of six seconds has: for where many accounts of a log are compared, as all pairs of joints exchanged
 FEW_WINDOWS = 24
 _ALIKE = 4  # neighbouring windows that err alike, and count for one
@@ -102,7 +102,7 @@ def torque_scale(
     recording: Recording,
     arm: Arm,
     constants: NDArray[np.float64] | None = None,
-    most: int = _MOST_WINDOWS,
+    most: int = MOST_WINDOWS,
     lacks: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
     gears: bool = False,
 ) -> TorqueScale | None:
@@ -112,26 +112,18 @@ def torque_scale(
     positions (M, n), (M, n) [N·m]. gears: whether viscous friction and the rotors' inertia may be in tau, too.
     """
     system = _System.of(recording, arm, most, lacks, gears, constants)
-    if system is None:
-        return None
-    A, b, y, inner = system.A, system.b, system.y, system.inner
+    return None if system is None else _Marginal.of(system).fit(system.y, constants)
 
-    # Marginalise everything but s: with K = 1 + A·Aᵀ, s = bᵀK⁻¹y / bᵀK⁻¹b
-    Kb = b - A @ (inner @ (A.T @ b))
-    information = float(b @ Kb)
-    if information <= 0:
-        return None
-    scale = float(y @ Kb) / information
-    left = y - b
-    rest = left - A @ (inner @ (A.T @ left))  # what s = 1 leaves
-    misfit = float(np.sqrt(np.mean(rest**2)))
-    std = np.sqrt(_ALIKE) * max(1.0, misfit) / np.sqrt(information)
-    evidence = -0.5 * float(left @ rest)
-    if constants is not None:  # of what the unknowns make up, which may be anything, nothing is believed
-        noise_alone = 1.0 - np.einsum("ij,jk,ik->i", A, inner, A)
-        evidence += float(noise_alone.reshape(-1, arm.n).sum(axis=0) @ np.log(constants))
-    best = evidence + 0.5 * (scale - 1.0) ** 2 * information
-    return TorqueScale(scale, std, misfit, evidence / _ALIKE, best / _ALIKE)
+
+def torque_scales(
+    recording: Recording, arm: Arm, orders: Iterable[list[int]], most: int = MOST_WINDOWS
+) -> list[TorqueScale | None]:
+    """`torque_scale` of a log with the columns of tau in each of some orders; what is not of tau is computed once."""
+    system = _System.of(recording, arm, most)
+    if system is None:
+        return [None for _ in orders]
+    marginal, tau = _Marginal.of(system), system.tau
+    return [marginal.fit(tau[:, order].ravel() / system.noise) for order in orders]
 
 
 def log_odds_of_change(recording: Recording, arm: Arm) -> float:
@@ -159,20 +151,21 @@ def _log_evidence(A: NDArray[np.float64], y: NDArray[np.float64]) -> float:
 class _System(NamedTuple):
     """y = s·b + A·x + noise, x and noise ~ N(0, 1), of all rows, n a window.
 
-    A: (W·n, p), the payload's ten columns first. b, y: (W·n,).
+    A: (W·n, p), the payload's ten columns first. b, noise: (W·n,), noise in N·m. tau: (W, n) [N·m].
     """
 
     windows: int
     A: NDArray[np.float64]
     b: NDArray[np.float64]
-    y: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    noise: NDArray[np.float64]
 
     @classmethod
     def of(
         cls,
         recording: Recording,
         arm: Arm,
-        most: int = _MOST_WINDOWS,
+        most: int = MOST_WINDOWS,
         lacks: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         gears: bool = False,
         constants: NDArray[np.float64] | None = None,
@@ -200,12 +193,48 @@ class _System(NamedTuple):
         A, prior = np.concatenate(columns, axis=2), np.concatenate(prior)  # (W, n, 10 + 2n or 4n), standard deviations
         # a joint at rest is held by any friction below stiction: tanh knows nothing of it
         noise = (rated * np.hypot(MODEL_ERROR, STICTION * (1.0 - np.minimum(moving, 1.0)))).ravel()
-        return cls(W, A.reshape(W * n, -1) * prior / noise[:, None], own.ravel() / noise, tau.ravel() / noise)
+        return cls(W, A.reshape(W * n, -1) * prior / noise[:, None], own.ravel() / noise, tau, noise)
 
     @property
-    def inner(self) -> NDArray[np.float64]:
-        """(1 + Aᵀ·A)⁻¹, (p, p)."""
-        return np.asarray(np.linalg.inv(np.eye(self.A.shape[1]) + self.A.T @ self.A), float)
+    def y(self) -> NDArray[np.float64]:
+        """(W·n,)."""
+        return self.tau.ravel() / self.noise
+
+
+class _Marginal(NamedTuple):
+    """y = s·b + noise with everything but s marginalised, K = 1 + A·Aᵀ.
+
+    inner: (1 + Aᵀ·A)⁻¹, (p, p). Kb: K⁻¹b. information: bᵀK⁻¹b.
+    """
+
+    system: _System
+    inner: NDArray[np.float64]
+    Kb: NDArray[np.float64]
+    information: float
+
+    @classmethod
+    def of(cls, system: _System) -> _Marginal:
+        A, b = system.A, system.b
+        inner = np.asarray(np.linalg.inv(np.eye(A.shape[1]) + A.T @ A), float)
+        Kb = b - A @ (inner @ (A.T @ b))
+        return cls(system, inner, Kb, float(b @ Kb))
+
+    def fit(self, y: NDArray[np.float64], constants: NDArray[np.float64] | None = None) -> TorqueScale | None:
+        """s = bᵀK⁻¹y / bᵀK⁻¹b, and what s = 1 leaves; None where b tells nothing. constants: as of `torque_scale`."""
+        (A, b), inner, information = (self.system.A, self.system.b), self.inner, self.information
+        if information <= 0:
+            return None
+        scale = float(y @ self.Kb) / information
+        left = y - b
+        rest = left - A @ (inner @ (A.T @ left))  # what s = 1 leaves
+        misfit = float(np.sqrt(np.mean(rest**2)))
+        std = np.sqrt(_ALIKE) * max(1.0, misfit) / np.sqrt(information)
+        evidence = -0.5 * float(left @ rest)
+        if constants is not None:  # of what the unknowns make up, which may be anything, nothing is believed
+            noise_alone = 1.0 - np.einsum("ij,jk,ik->i", A, inner, A)
+            evidence += float(noise_alone.reshape(-1, len(constants)).sum(axis=0) @ np.log(constants))
+        best = evidence + 0.5 * (scale - 1.0) ** 2 * information
+        return TorqueScale(scale, std, misfit, evidence / _ALIKE, best / _ALIKE)
 
 
 def _averages(recording: Recording, arm: Arm, parts: Windows) -> tuple[NDArray, ...]:

@@ -122,8 +122,10 @@ class RegressionData:
         """What several stretches of one recording say together, to be read and not to be added to."""
         first = parts[0]
         out = cls(first.correction, first.gain, first.features, first.blocks.block, first.session)
-        out.A, out.b = sum(part.A for part in parts), sum(part.b for part in parts)  # type: ignore[assignment]
-        out.c = sum(part.c for part in parts)  # type: ignore[assignment]
+        for part in parts:
+            out.A += part.A
+            out.b += part.b
+            out.c += part.c
         out.blocks = BlockMeans.joined([part.blocks for part in parts])
         return out
 
