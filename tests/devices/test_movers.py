@@ -316,6 +316,31 @@ def test_what_is_left_to_the_start_is_taken_up_without_a_jump(panda):
     assert max(np.abs(path - pose).max(axis=1).min() for pose in q[::20]) < 5e-3
 
 
+@pytest.mark.parametrize("meanwhile", ["problem", "_brakes"])
+def test_a_stop_from_another_thread_is_never_lost_and_its_reason_is_kept(panda, monkeypatch, meanwhile):
+    """It comes while the newest sample is looked at, or between that and the command."""
+    mover = Obedient(panda, START)
+    owner = Supervision if meanwhile == "problem" else Obedient
+    before = getattr(owner, meanwhile)
+
+    def asked(*args):
+        if 1.0 < mover.t < 1.0 + CYCLE:
+            mover.stop("asked")
+        return before(*args)
+
+    monkeypatch.setattr(owner, meanwhile, asked)
+    samples = run(mover, MOTION)
+    assert mover.why == "asked"
+    assert samples[-1].t < 2.0
+
+
+def test_a_stop_that_comes_after_the_end_stops_nothing(panda):
+    mover = Obedient(panda, START)
+    motion = StraightMotion(START, START + 0.1, 1.0)
+    run(mover, motion, round(1.1 / CYCLE), lambda: mover.stop("too late"))
+    assert mover.why is None
+
+
 def test_an_arm_that_does_not_follow_is_never_taken_for_one_that_arrived(panda):
     mover = Obedient(panda, START)
     mover.follow(StraightMotion(START, START + 0.2, 1.0))
@@ -351,7 +376,8 @@ class Gap(Obedient):
 def moved_with_a_gap(panda, monkeypatch, passed, waited):
     mover = Gap(panda, START, passed, waited)
     clock = SimpleNamespace(monotonic=lambda: mover.now)
-    monkeypatch.setattr("armload.devices.mover.time", clock)
+    for module in ("mover", "heard"):
+        monkeypatch.setattr(f"armload.devices.{module}.time", clock)
     run(mover, MOTION)
     assert not mover.moving
     return mover, np.array(mover.targets)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.arms.units import unit_of
+from armload.devices.heard import Heard
 from armload.devices.load import Load
 from armload.devices.source import Source
 from armload.devices.supervision import SILENCE, Supervision, Thresholds
@@ -105,8 +106,9 @@ class StreamedMover(Mover):
 
     def __init__(self, arm: Arm) -> None:
         self.arm, self.n = arm, arm.n
+        self._heard = Heard()
         self._movement: Movement | None = None
-        self._stop_for: str | None = None
+        self._stop_for: str | None = None  # any thread may set it, and none takes it back before the next movement
 
     @property
     def moving(self) -> bool:
@@ -129,18 +131,19 @@ class StreamedMover(Mover):
 
         begun: called when a movement begins: the time on the samples' clock at which its first command takes effect.
         """
+        passed, waited = self._heard.at(sample.t)
         movement = self._movement
         if movement is None:
             return None
         if movement.begun is None:
             movement.begun = begun()
-        passed, waited = movement.heard_at(sample.t)
-        if abs(passed) > max(SILENCE, _USUAL / self.rate):
+        elif abs(passed) > max(SILENCE, _USUAL / self.rate):
             self._missed(movement, passed, waited)
         t, course = sample.t - movement.begun, movement.course
         if course.braked is None:
-            self._stop_for = self._stop_for or movement.supervision.problem(max(t, 0.0), sample, course)
-            self.why = self._stop_for
+            found = movement.supervision.problem(max(t, 0.0), sample, course)
+            if found is not None:
+                self._halt(found)
         if t > course.duration + SETTLE:
             self._movement = None
             return None
@@ -157,13 +160,18 @@ class StreamedMover(Mover):
         else:
             why = f"the clock of its samples jumped by {passed:+.2f} s (see what sets it)"
             self._jumped(movement, passed)
-        self.why = self._stop_for = self._stop_for or why
+        self._halt(why)
+
+    def _halt(self, why: str) -> None:
+        """Brake, and say why, also where the movement is over but for its samples."""
+        self.stop(why)
+        self.why = self._stop_for
 
     def _silent(self, movement: Movement, passed: float) -> None:
         """Go on after `passed` [s] without a sample: the arm stands at the last command, and stays there."""
         assert movement.begun is not None
         movement.begun += passed
-        movement.course.stand(movement.newest - movement.begun + 1.0 / self.rate)
+        movement.course.stand(self._heard.newest - movement.begun + 1.0 / self.rate)
 
     def _jumped(self, movement: Movement, passed: float) -> None:
         """Go on where the arm is on its path, though the samples' clock jumped by `passed` [s]."""
@@ -174,6 +182,7 @@ class StreamedMover(Mover):
         """Brake from t [s] on the movement's clock on, if that was asked for."""
         if self._stop_for is not None and movement.course.braked is None and t < movement.course.duration:
             movement.course.brake(max(t, 0.0))
+            self.why = self._stop_for
 
 
 class Movement:
@@ -183,24 +192,7 @@ class Movement:
         self.course = Course(motion, arm.limits)
         self.supervision = Supervision(arm, motion, thresholds)
         self.begun: float | None = None
-        self.newest, self._seen = np.nan, np.nan  # the newest sample's time, and when that was seen
-        self.behind = 0.0  # [s] how old the newest sample is at least, should samples have waited unseen
         self._away = away
-
-    def heard_at(self, t: float) -> tuple[float, float]:
-        """How far the samples' clock, now at t, and ours went on since the sample before [s]; 0 at the first one.
-
-        While this process does not run (it is stopped, its disk hangs), samples wait where nobody says since when. So
-        what ours went on beyond theirs is kept until they have caught up (`behind`), and counts as waited, too.
-        """
-        before, seen = self.newest, self._seen
-        self.newest, self._seen = t, time.monotonic()
-        if np.isnan(before):
-            return 0.0, 0.0
-        passed, waited = t - before, self.behind + self._seen - seen
-        if passed >= 0.0:  # else their clock was set back, which tells nothing of what waits
-            self.behind = max(0.0, waited - passed) if waited > SILENCE or self.behind else 0.0
-        return passed, waited
 
     def target(self, t: float) -> NDArray[np.float64]:
         """The command q (n,) for t [s] on the movement's clock: without a jump from where the arm was held."""

@@ -87,28 +87,29 @@ class Ros2Mover(StreamedMover):
         movement = self._took(sample, lambda at=sample.t: self._begins(at))
         if movement is not None:
             assert movement.begun is not None
-            t = self._now(movement, movement.begun)
-            braked = movement.course.braked
+            t = self._heard.newest - movement.begun + self._waited()
             self._late(movement.course, t)
+            known = copy(movement.course)
             self._brakes(movement, t + _LEAD)
-            if movement.course.braked != braked or t - self._sent >= _EVERY:
-                self._send(movement.course, t)
+            changed = movement.course.braked != known.braked
+            if (changed or t - self._sent >= _EVERY) and not self._send(movement.course, t):
+                movement.course = known
         elif under_way is not None and self.why is None:
             self.why = self._left()
 
-    def _now(self, movement: Movement, begun: float) -> float:
-        """The instant of a movement that the controller is at, after its newest sample [s].
+    def _waited(self) -> float:
+        """How far the controller's clock has gone on since its newest sample [s], as far as can be told.
 
         Where simulated time runs slower than ours, what it is behind does not tell that samples wait.
         """
-        return movement.newest - begun + max(self._source.lag(), movement.behind if self._source.paced else 0.0)
+        return max(self._source.lag(), self._heard.behind if self._source.paced else 0.0)
 
     def _late(self, course: Course, t: float) -> None:
         """Brake where the newest trajectory does, if it is too late for another: from there on the arm is elsewhere."""
         braking = max(self._sent, 0.0) + _AHEAD
         if course.braked is None and np.isfinite(self._sent) and braking < min(t + _LEAD, course.duration):
             course.brake(braking)
-            self.why = self._stop_for = self._stop_for or (
+            self._halt(
                 f"no trajectory could be sent for {t - self._sent:.2f} s (expected less than {_AHEAD - _LEAD:g} s): "
                 "this process did not run; see what held it up, and give this machine less other work"
             )
@@ -173,11 +174,8 @@ class Ros2Mover(StreamedMover):
         """Leave the network; an arm on its way comes to rest."""
         self._source.close()
 
-    def _silent(self, movement: Movement, passed: float) -> None:  # noqa: ARG002
-        """Brake where the newest trajectory does, at the latest: the controller has followed it meanwhile."""
-        assert movement.begun is not None
-        now = self._now(movement, movement.begun)
-        movement.course.brake(min(max(now, 0.0) + _LEAD, max(self._sent, 0.0) + _AHEAD))
+    def _silent(self, movement: Movement, passed: float) -> None:
+        """Nothing: the controller has followed its newest trajectory meanwhile, and `_late` brakes where that does."""
 
     def _jumped(self, movement: Movement, passed: float) -> None:
         """The controller's clock is the samples': stamps go with it."""
@@ -186,24 +184,27 @@ class Ros2Mover(StreamedMover):
 
     def _begins(self, t: float) -> float:
         """The start of a movement, on the samples' clock [s]."""
-        wait = self._source.lag() + _BEGIN
+        wait = self._waited() + _BEGIN
         self._start, self._sent = self._source.stamp(t) + round(1e9 * wait), -np.inf
         return t + wait
 
-    def _send(self, course: Course, t: float) -> None:
-        """The piece of the motion that is ahead at t [s] on its clock."""
-        self._sent = t
+    def _send(self, course: Course, t: float) -> bool:
+        """Send the piece of the motion that is ahead at t [s] on its clock; False: it was not ready in time."""
+        begun = time.monotonic()
         piece = copy(course)
         if piece.braked is None:
             piece.brake(max(t, 0.0) + _AHEAD)
-        self._goal = piece.position([piece.duration])[0]
         first = max(t, 0.0) + 0.5 * _LEAD
         times = np.append(np.arange(first, piece.duration, _APART), max(piece.duration, first) + _APART)
         message = self._connection.JointTrajectory()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(self._start, 1_000_000_000)
         message.joint_names = list(self.arm.joint_names)
         message.points = [self._point(*row) for row in zip(times.tolist(), *piece(times), strict=True)]
+        if time.monotonic() - begun > 0.5 * _LEAD:  # this process did not run: the arm is past the first point
+            return False
         self._publish(message)
+        self._sent, self._goal = t, piece.position([piece.duration])[0]
+        return True
 
     def _point(self, t: float, q: NDArray, dq: NDArray, ddq: NDArray) -> Any:
         point = self._connection.JointTrajectoryPoint()
