@@ -22,6 +22,11 @@ DAY = 86400.0  # [s]
 PATIENCE = 120.0  # [s]
 
 
+def restored(process):
+    """What a process goes on from."""
+    return process.state.restored(process.arm, process.settings.method, None, known=None, every=process.every)
+
+
 def test_what_a_saved_state_holds_is_unconfirmed_until_a_second_has_told(panda, analytic_log, tmp_path):
     held, path = test_payload().parameters, tmp_path / "run.csv"
     write_recording(path, analytic_log(panda, held, duration=4.0))
@@ -71,7 +76,7 @@ def test_a_state_is_gone_on_from_while_the_arm_is_that_of_the_same_session(
     identifier.close()
     process, notes = ArmProcess(settings, 0.1, ()), []
     monkeypatch.setattr(process, "note", notes.append)
-    found = process._restored(None)
+    found = restored(process)
     process.source.close()
     assert (found is not None) == goes_on
     if found is None:
@@ -116,7 +121,7 @@ def test_a_state_of_another_version_is_said_to_be_that_and_the_stream_begins_ane
     identifier.close()
     process, notes = ArmProcess(settings, 0.1, ()), []
     monkeypatch.setattr(process, "note", notes.append)
-    assert process._restored(None) is None
+    assert restored(process) is None
     process.source.close()
     assert notes == [f"{settings.state} belongs to another version of armload: begun anew"]
 
@@ -142,7 +147,7 @@ def test_what_is_known_of_payloads_counts_in_a_stream_that_begins_and_in_one_tha
         session.identifier.save(settings.state)
         session.close()
         process.source.close()
-        assert process._continued == (name == "goes on")
+        assert process.state.continued == (name == "goes on")
     assert determined["begins"] == determined["goes on"] == 10
     assert determined["plain"] < 10
 
@@ -169,12 +174,12 @@ def test_a_state_is_of_the_tare_that_the_stream_goes_by_whatever_its_file_says_s
         session._take(sample)
     tare.unlink()
     write_recording(tare, analytic_log(panda, test_payload().parameters, duration=3.0))
-    process._save(session)
+    process.state.save(session)
     session.close()
     assert before is not None
     assert before.exists()
     assert settings.state != before
-    assert ArmProcess(settings, 0.1)._restored(None) is None  # its state is none of the new tare's
+    assert restored(ArmProcess(settings, 0.1)) is None  # its state is none of the new tare's
 
 
 def test_while_the_disk_is_full_the_last_state_stays_and_it_is_saved_again_once_there_is_room(
@@ -187,7 +192,7 @@ def test_while_the_disk_is_full_the_last_state_stays_and_it_is_saved_again_once_
     process, said, states = ArmProcess(settings, 0.1), [], []
     monkeypatch.setattr(process, "_write", lambda fields: said.append(fields.get("note")))
     monkeypatch.setattr("armload.service.arm_process.SAVE_EVERY", 0.3)
-    save, before = process._save, resource.getrlimit(resource.RLIMIT_FSIZE)
+    save, before = process.state.save, resource.getrlimit(resource.RLIMIT_FSIZE)
 
     def saved(session):
         full = 2 <= len(states) < 4  # no file can grow beyond what a disk has left
@@ -201,7 +206,7 @@ def test_while_the_disk_is_full_the_last_state_stays_and_it_is_saved_again_once_
         if len(states) == 6:
             process.source.close()
 
-    monkeypatch.setattr(process, "_save", saved)
+    monkeypatch.setattr(process.state, "save", saved)
     process.run()
     assert len(states) >= 6
     assert states[1] == states[2] == states[3]

@@ -56,7 +56,6 @@ def test_a_state_of_other_settings_goes_away_once_nothing_goes_on_from_it(settin
     saved(today, 0.5 * HOUR)  # whoever changes the settings back goes on from it
     process, notes = ArmProcess(settings, 0.1), []
     monkeypatch.setattr(process, "note", notes.append)
-    monkeypatch.setattr(process._others, "_said", notes.append)
     process.run()
     assert sorted(mine.parent.iterdir()) == sorted([mine, today])
     assert notes[0] == f"{before}, a state of other settings, is too old to go on from: removed"

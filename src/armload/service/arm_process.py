@@ -22,29 +22,26 @@ from armload.arms import Arm
 from armload.devices import Detached, Reader, Steadied, controller_of
 from armload.devices.reader import columns_of
 from armload.devices.recorder import next_free
-from armload.errors import ArmloadError, IdentificationError
+from armload.errors import ArmloadError
 from armload.identification.tare_age import age_of, in_words
-from armload.online import OnlineEstimate, OnlineIdentifier
-from armload.online.state import saved_at
-from armload.posterior import Known, Profile, load_profile
-from armload.posterior.drift import SESSION
-from armload.recording import Sample, check_own_measurements, read_recording
-from armload.runtime.atomic import clear_left_over, kept_alone
+from armload.online import OnlineEstimate
+from armload.posterior import load_profile
+from armload.recording import check_own_measurements, read_recording
+from armload.runtime.atomic import kept_alone
 from armload.runtime.compiling import COMPILING, compiling
 from armload.service.absence import Absence
 from armload.service.catching_up import CatchingUp
 from armload.service.feedback import Feedback
 from armload.service.finite import finite
-from armload.service.old_states import OldStates, not_saved
 from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
+from armload.service.saved_state import CHANGED, SavedState
 from armload.service.session import TICK, Session
 from armload.service.settings import ArmSettings
 from armload.service.unknown import Unknown, Why, why_unknown
 
 SAVE_EVERY = 60.0  # [s] of what a kill may cost; saving takes the stream a tenth of a second
 _ENDS = 15.0  # [s] the process of a service that was killed may take to save and end: seconds on busy cores
-_CHANGED = "and offsets and friction change within hours"
 
 
 class ArmProcess:
@@ -58,13 +55,9 @@ class ArmProcess:
     def __init__(self, settings: ArmSettings, every: float, readers: Sequence[Reader] = (), since: float = 0.0) -> None:
         # alarms, and whoever asks the endpoint, need to know at any moment
         self.settings, self.every, self._reader = settings, min(every, TICK), None
-        self._state = settings.state  # of the files as they are now: one written anew is not what the stream goes by
-        self._others = OldStates(self._state, SESSION, self.note)
-        self._told = self._saved = -float("inf")
-        self._kept: float | None = None  # when the state that is there was saved [s, monotonic]
-        self._continued = False  # whether it goes on from a state
-        self._failed: str | None = None  # why it could not be saved
-        self._newest: Sample | None = None  # that the state saved last is of
+        # of the files as they are now: one written anew is not what the stream goes by
+        self.state = SavedState(settings.state, lambda text: self.note(text))
+        self._told = -float("inf")
         self._line, self._late = threading.Lock(), CatchingUp()
         self._since = 0.0 if settings.replays else since  # what its tare has, as every replay begins its log anew
         self.arm = self._made_arm()
@@ -80,11 +73,11 @@ class ArmProcess:
 
     def run(self) -> None:
         """Until the source or standard input ends."""
-        state = self._state  # which another process would write over
-        with self._speaking(), contextlib.nullcontext() if state is None else kept_alone(state, _ENDS):
+        path = self.state.path  # which another process would write over
+        with self._speaking(), contextlib.nullcontext() if path is None else kept_alone(path, _ENDS):
             self.source.start()  # it is opened while the state is read
             self.session = session = self._made_session()
-            self._saved = time.monotonic()
+            saved = time.monotonic()
             try:
                 if self.settings.apply is not None:
                     self._feedback = self._made_feedback()
@@ -92,15 +85,16 @@ class ArmProcess:
                 for _ in session.estimates():
                     now = time.monotonic()
                     if (gone := absence.ended(session.sample, now)) is not None:
-                        self.note(f"no sample for {in_words(gone)}, {_CHANGED}: begun anew")
+                        self.note(f"no sample for {in_words(gone)}, {CHANGED}: begun anew")
                         session.reset()
                     if now - self._told >= 0.999 * self.every:
                         self._tell(session, now)
-                    if now - self._saved >= SAVE_EVERY:
-                        self._save(session)
+                    if now - saved >= SAVE_EVERY:
+                        saved = now
+                        self.state.save(session)
                 if session.estimate is not None:
                     self._tell(session, time.monotonic())
-                    self._save(session)
+                    self.state.save(session)
             finally:
                 if self._feedback is not None:
                     self._feedback.close()
@@ -139,7 +133,7 @@ class ArmProcess:
     def _tell(self, session: Session, now: float) -> None:
         self._told = now
         source, estimate = self.source, session.as_of_now()
-        link = source.link(before=self._continued)  # since it was saved the payload may have been exchanged
+        link = source.link(before=self.state.continued)  # since it was saved the payload may have been exchanged
         if source.answering:  # how long that took is in its lag
             link = link._replace(heard=now)
         compiles = self._late.why(None if estimate is None else estimate.lag, now)
@@ -161,7 +155,7 @@ class ArmProcess:
             "connection": source.state,
             "connections": source.connections,
             "lost": source.lost,
-            "saved": None if self._kept is None else now - self._kept,
+            "saved": self.state.age(now),
             "arm_changed": None if self.session is None else self.session.identifier.arm_changed,
         }
         if self._feedback is not None:
@@ -204,7 +198,7 @@ class ArmProcess:
         settings = self.settings
         profile = None if settings.profile is None else load_profile(settings.profile)
         known = settings.known_on(self.arm)
-        identifier = self._restored(profile, known)
+        identifier = self.state.restored(self.arm, settings.method, profile, known=known, every=self.every)
         tare = None if settings.tare is None else read_recording(settings.tare, self.arm)
         if tare is not None and settings.replays:
             check_own_measurements(read_recording(settings.source, self.arm), tare)
@@ -215,47 +209,6 @@ class ArmProcess:
         source = Steadied(self.source) if settings.steady else self.source
         about = (tare, settings.method, self.note, profile, identifier)
         return Session(source, self.arm, *about, known=known, every=self.every, tare_age=age)
-
-    def _restored(self, profile: Profile | None, known: Known | None = None) -> OnlineIdentifier | None:
-        """What goes on from the saved state, unless that is of a time when the arm may have been another."""
-        path = self._state
-        if path is not None:
-            clear_left_over(path)
-            self._others.clear(time.monotonic())
-        if path is None or not path.exists():
-            return None
-        try:
-            ago = time.time() - saved_at(path)
-            if ago < -SESSION:
-                self.note(f"{path} was saved at a time that is still to come, nobody knows how old it is: begun anew")
-                return None
-            if ago > SESSION:
-                self.note(f"{path} was saved {in_words(ago)} ago, {_CHANGED}: begun anew")
-                return None
-            method, every = self.settings.method, self.every
-            identifier = OnlineIdentifier.restore(path, self.arm, method, profile, known=known, every=every)
-        except (IdentificationError, OSError) as error:
-            self.note(f"{str(error).removesuffix(': begin without it')}: begun anew")
-            return None
-        self._kept, self._continued = time.monotonic() - max(ago, 0.0), True
-        self.note(f"continued from {path}, saved {max(ago, 0.0):.0f} s ago")
-        return identifier
-
-    def _save(self, session: Session) -> None:
-        self._saved, path = time.monotonic(), self._state
-        self._others.clear(self._saved)
-        if path is None or session.sample is self._newest:  # what was not seen since is not of now
-            return
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            session.identifier.save(path)
-            if self._failed is not None:
-                self.note("the state is saved again")
-            self._kept, self._failed, self._newest = time.monotonic(), None, session.sample
-        except (ArmloadError, OSError) as error:
-            if (why := not_saved(path, error)) != self._failed:
-                self.note(why)
-            self._failed = why
 
 
 def main() -> None:
