@@ -16,6 +16,12 @@ def test_a_script_finds_what_it_imports(name, monkeypatch):
     assert script.__doc__
 
 
+def test_each_script_that_can_be_run_is_on_the_page_of_reruns_as_it_says_of_itself(monkeypatch):
+    monkeypatch.syspath_prepend(FOLDER)
+    script = importlib.import_module("list_of_scripts")
+    assert script.listed() in script.PAGE.read_text(encoding="utf-8")
+
+
 def test_a_survey_of_a_long_log_is_measured_again_at_another_rate_and_kept_beside_others(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(FOLDER)
     script, results = importlib.import_module("long_logs"), []
