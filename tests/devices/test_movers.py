@@ -333,6 +333,28 @@ def test_a_franka_robot_in_another_mode_is_refused_before_it_is_commanded(mode):
     assert mover.hindrance() is None
 
 
+def test_a_ur_is_not_lost_because_this_process_did_not_run(ur, monkeypatch):
+    """Its client has heard nothing either when the process goes on."""
+    mover, _ = ur("")
+    clock, looks = SimpleNamespace(now=5.0), iter([1.0, 1.0, 1.0, 1.0, *[1.002] * 10_000])
+    client = mover._source.client
+    client.getActualQ = client.getActualCurrent = lambda: [0.0] * 6
+
+    def timestamp():
+        clock.now += 1e-3
+        return next(looks)
+
+    client.getTimestamp = timestamp
+    monkeypatch.setattr("armload.devices.ur.source.time", SimpleNamespace(monotonic=lambda: clock.now))
+    samples = iter(mover)
+    assert next(samples).t == 1.0
+    clock.now += 3.0
+    assert next(samples).t == 1.002
+    with pytest.raises(SourceError, match=r"was lost: no sample for 1\.0 s"):  # one that says nothing is
+        next(samples)
+    mover.close()
+
+
 def test_a_ur_that_is_not_where_it_was_to_go_says_what_may_have_held_it(ur):
     mover, _ = ur("")
     with pytest.raises(SafetyError, match=r"move the arm to its start first, and .*its speed slider is at 100 %"):
