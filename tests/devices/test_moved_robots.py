@@ -343,6 +343,21 @@ def test_the_answer_is_written_in_the_controller_s_order_after_both_runs(served)
 
 @pytest.mark.parametrize("serve", ["ur"], indirect=True)
 @in_time
+def test_an_arm_that_would_not_follow_is_told_by_the_plan_and_never_moved(served):
+    for fault, says in (("slider", "its speed slider is at 50 %"), ("protective", "it is in a protective stop")):
+        served.process.stdin.write(f"{fault}\n")
+        served.process.stdin.flush()
+        served.wait(fault)
+        for argument in ("--dry-run", "--move"):
+            code, out, err = served.measure(argument)
+            assert (code, out) == (2, "")
+            assert says in err.splitlines()[-1]
+            assert "nothing was moved" in err.splitlines()[-1]
+    assert not {"script", "moving"} & set(served.said())
+
+
+@pytest.mark.parametrize("serve", ["ur"], indirect=True)
+@in_time
 def test_a_payload_that_the_controller_does_not_count_is_no_answer_that_was_written_nor_one_that_was_not(served):
     served.process.stdin.write("forget\n")
     served.process.stdin.flush()

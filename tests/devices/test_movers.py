@@ -199,6 +199,7 @@ def ur(monkeypatch):
     """A factory of UR movers whose control client fails at something."""
     robot = arm("ur10e")
     still = {"getActualQd": lambda: [0.0] * 6, "getTargetQ": lambda: [0.0] * 6, "isConnected": lambda: True}
+    still |= {"getRobotMode": lambda: 7, "getSafetyMode": lambda: 1, "getTargetSpeedFraction": lambda: 1.0}
     counts = {"getPayload": lambda: 1.0, "getPayloadCog": lambda: [0.0, 0.0, 0.1]}
     counts["getPayloadInertia"] = lambda: [1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0]
     receive = SimpleNamespace(**still, **counts, disconnect=lambda: None)
@@ -253,6 +254,104 @@ def test_a_ur_that_does_not_follow_is_stopped_and_what_may_hold_it_is_said(ur):
         if not mover.moving:
             break
     assert re.search(r"off the path .*see on its pendant whether it is stopped or paused, and .*slider", mover.why)
+    mover.close()
+
+
+@pytest.mark.parametrize(
+    ("says", "value", "said"),
+    [
+        ("getRobotMode", 5, "would not follow: it is held by its brakes; switch it on, and release its brakes"),
+        ("getSafetyMode", 3, "it is in a protective stop; end that on its pendant"),
+        ("getSafetyMode", 12, "it is in safety mode 12"),
+        ("getTargetSpeedFraction", 0.5, "its speed slider is at 50 %; set it to 100 %"),
+    ],
+)
+def test_a_ur_that_would_not_follow_is_refused_before_its_program_is_replaced(ur, says, value, said):
+    mover, controls = ur("")
+    setattr(mover._source.client, says, lambda: value)
+    with pytest.raises(SafetyError, match=said):
+        mover.follow(StraightMotion(np.zeros(6), 0.3 * np.ones(6), 2.0))
+    assert not controls.asked
+    mover.close()
+
+
+def test_a_ur_is_never_asked_to_catch_up_with_what_came_late_or_with_a_clock_that_was_set(ur):
+    """servoJ stands at its last target: each one is a cycle along the path."""
+    mover, controls = ur("")
+    cycle, targets, rng = 2e-3, [np.zeros(6)], np.random.default_rng(1)
+    client, state = mover._source.client, SimpleNamespace(t=1.0, looks=0)
+
+    def timestamp():  # each state is looked at twice
+        if state.looks % 2 == 0:
+            state.t += cycle if rng.random() < 0.9 else rng.uniform(-0.09, 0.09)
+        state.looks += 1
+        return state.t
+
+    client.getTimestamp = timestamp
+    client.getActualQ = lambda: targets[-1]
+    client.getActualCurrent = lambda: [0.0] * 6
+    controls.servoJ = lambda q, *_: not targets.append(np.array(q))
+    motion = StraightMotion(np.zeros(6), 0.3 * np.ones(6), 2.0)
+    mover.follow(motion, Thresholds(external=1e3))
+    for _ in mover:
+        if not mover.moving:
+            break
+    assert mover.why is None
+    step = np.diff(targets, axis=0)
+    assert step.min() > -1e-12
+    assert step.max() <= cycle * motion.velocity(motion.instants(500.0)).max() * 1.001
+    np.testing.assert_allclose(targets[-1], 0.3, atol=1e-9)
+    mover.close()
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.8, "was stopped by its watchdog: no target .* 0.8"), (0.0, "pendant")]
+)
+def test_a_ur_whose_watchdog_ended_its_program_says_so(ur, monkeypatch, seconds, said):
+    mover, controls = ur("")
+    clock = SimpleNamespace(now=5.0)
+    monkeypatch.setattr("armload.devices.ur.mover.time", SimpleNamespace(monotonic=lambda: clock.now))
+    mover.follow(StraightMotion(np.zeros(6), 0.3 * np.ones(6), 2.0))
+    controls.servoJ = lambda *_: True
+    mover._servo(np.zeros(6))
+    clock.now += seconds
+    controls.servoJ = lambda *_: False
+    with pytest.raises(SourceError, match=said):
+        mover._servo(np.zeros(6))
+    mover.close()
+
+
+@pytest.mark.parametrize("mode", ["Guiding", "kReflex", "UserStopped", "kAutomaticErrorRecovery"])
+def test_a_franka_robot_in_another_mode_is_refused_before_it_is_commanded(mode):
+    mover = FrankaMover.__new__(FrankaMover)  # a robot and its client are not needed for this
+    state = SimpleNamespace(robot_mode=SimpleNamespace(name=mode), q_d=np.zeros(7))
+    mover.name, mover.n, mover._movement, mover._mode = "fr3://robot", 7, None, None
+    mover._source = SimpleNamespace(state=lambda: state)
+    with pytest.raises(SafetyError, match=r"would not follow: .*; (let go|acknowledge|release|wait)"):
+        mover.follow(StraightMotion(np.zeros(7), 0.1 * np.ones(7), 2.0))
+    mover._mode = "kIdle"
+    assert mover.hindrance() is None
+
+
+def test_a_ur_is_not_lost_because_this_process_did_not_run(ur, monkeypatch):
+    """Its client has heard nothing either when the process goes on."""
+    mover, _ = ur("")
+    clock, looks = SimpleNamespace(now=5.0), iter([1.0, 1.0, 1.0, 1.0, *[1.002] * 10_000])
+    client = mover._source.client
+    client.getActualQ = client.getActualCurrent = lambda: [0.0] * 6
+
+    def timestamp():
+        clock.now += 1e-3
+        return next(looks)
+
+    client.getTimestamp = timestamp
+    monkeypatch.setattr("armload.devices.ur.source.time", SimpleNamespace(monotonic=lambda: clock.now))
+    samples = iter(mover)
+    assert next(samples).t == 1.0
+    clock.now += 3.0
+    assert next(samples).t == 1.002
+    with pytest.raises(SourceError, match=r"was lost: no sample for 1\.0 s"):  # one that says nothing is
+        next(samples)
     mover.close()
 
 

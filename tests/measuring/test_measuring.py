@@ -114,6 +114,18 @@ def test_without_consent_nothing_moves_and_nothing_is_made(panda, simulated, tmp
     assert not folder.exists()
 
 
+def test_an_arm_that_would_not_follow_is_refused_before_anybody_is_asked(panda, simulated, tmp_path, monkeypatch):
+    mover, orders, folder = simulated(), Orders(), tmp_path / "new"
+    procedure = Procedure(mover, panda, MOTION, folder)
+    monkeypatch.setattr(mover, "hindrance", lambda: "its brakes hold")
+    with pytest.raises(SafetyError, match=r"nothing was moved: .* would not follow: its brakes hold"):
+        procedure.run(orders.consent, orders.mount(mover))
+    with pytest.raises(SafetyError, match="would not follow: its brakes hold"):
+        procedure.check()
+    assert not orders.seen
+    assert not folder.exists()
+
+
 def test_who_does_not_agree_once_the_payload_is_on_is_not_told_that_nothing_was_moved_at_all(
     panda, simulated, tmp_path
 ):

@@ -70,12 +70,16 @@ class Mover(Source):
         """Begin a movement.
 
         Raises:
-            SafetyError: the arm moves already, or is not where the motion begins.
+            SafetyError: the arm moves already, would not follow, or is not where the motion begins.
         """
 
     @abstractmethod
     def stop(self, why: str) -> None:
         """Let the arm come to rest on its path, soon; from any thread. Nothing happens at rest."""
+
+    def hindrance(self) -> str | None:
+        """Why the arm would not follow a movement now, by what its controller says of itself; None: nothing is said."""
+        return None
 
     def silence(self, seconds: float) -> str:
         """What to say where no sample came for so many seconds while the arm was on its way."""
@@ -139,6 +143,8 @@ class StreamedMover(Mover):
             movement.begun = begun()
         elif abs(passed) > max(SILENCE, _USUAL / self.rate):
             self._missed(movement, passed, waited)
+        else:
+            self._went_on(movement, passed)
         t, course = sample.t - movement.begun, movement.course
         if course.braked is None:
             found = movement.supervision.problem(max(t, 0.0), sample, course)
@@ -166,6 +172,12 @@ class StreamedMover(Mover):
         """Brake, and say why, also where the movement is over but for its samples."""
         self.stop(why)
         self.why = self._stop_for
+
+    def _went_on(self, movement: Movement, passed: float) -> None:
+        """The samples' clock went on by `passed` [s], little enough for the next command to be as far along the path.
+
+        A controller that stands at the last command meanwhile must not be asked to catch up.
+        """
 
     def _silent(self, movement: Movement, passed: float) -> None:
         """Go on after `passed` [s] without a sample: the arm stands at the last command, and stays there."""
@@ -205,11 +217,13 @@ def check_start(mover: Mover, motion: Motion) -> NDArray[np.float64]:
     """See that a movement may begin; how far the arm is from its start (n,) [rad], which is at most `AT_START`.
 
     Raises:
-        SafetyError: the arm moves already, or is not where the motion begins; the motion is of another arm, or does not
-            begin and end at rest.
+        SafetyError: the arm moves already, would not follow, or is not where the motion begins; the motion is of
+            another arm, or does not begin and end at rest.
     """
     if mover.moving:
         raise SafetyError(f"{mover.name} moves already: wait until it is at rest")
+    if (why := mover.hindrance()) is not None:
+        raise SafetyError(f"{mover.name} would not follow: {why}")
     if motion.n != mover.n:
         raise SafetyError(f"the motion {motion.name!r} moves {motion.n} joints: {mover.name} has {mover.n}")
     q, dq, _ = motion([0.0, motion.duration])

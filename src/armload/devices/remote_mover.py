@@ -65,9 +65,10 @@ class RemoteMover(Source):
         self.mover.stop(why)
 
     def whereabouts(self) -> dict[str, Any]:
-        """Where the arm is commanded to be, why it stopped, what to look at, whether its controller takes payloads."""
+        """Where the arm is commanded to be, why it stopped, what to look at, what hinders it, if it takes loads."""
         mover = self.mover
-        return {"commanded": mover.commanded().tolist(), "why": mover.why, "see": mover.see, "writes": mover.writes}
+        said = {"why": mover.why, "see": mover.see, "hindrance": mover.hindrance(), "writes": mover.writes}
+        return said | {"commanded": mover.commanded().tolist()}
 
     def put(self, load: dict[str, Any], allow_undetermined_inertia: bool) -> Any:
         """`Mover.write`."""
@@ -125,6 +126,10 @@ class DetachedMover(Detached, Mover):
     def see(self) -> str:  # type: ignore[override]
         """What to look at where the arm does not follow."""
         return self._call("whereabouts")["see"]
+
+    def hindrance(self) -> str | None:
+        """Why the arm would not follow a movement now."""
+        return self._call("whereabouts")["hindrance"]
 
     def commanded(self) -> NDArray[np.float64]:
         """Where the controller holds the arm, q (n,) [rad]."""

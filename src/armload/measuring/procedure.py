@@ -151,6 +151,13 @@ class Procedure:
             reached = self.accuracy.holds(half_width)
         return Measurement(answer, empty if about.tare is None else None, loaded, seconds, reached)
 
+    def check(self, plan: Plan | None = None) -> None:
+        """See that the arm may make all movements of a plan (None: of the first), and would; SafetyError if not."""
+        plan = plan or self.plan
+        plan.check(self._so_far(plan))
+        if (why := self.mover.hindrance()) is not None:
+            raise SafetyError(f"{self._so_far(plan)}: {self.mover.name} would not follow: {why}")
+
     def _loaded_run(self, tare: Recording, log: Path, consent: Callable[[Plan], bool]) -> float:
         """Move with the payload, from wherever the arm is now; how long that took [s]."""
         identifier = self._warm(tare)
@@ -166,7 +173,7 @@ class Procedure:
         return plan_of(self.arm, self.motion, at, empty_run=empty_run, **more)
 
     def _allowed(self, plan: Plan, consent: Callable[[Plan], bool]) -> None:
-        plan.check(self._so_far(plan))
+        self.check(plan)
         if not consent(plan):
             raise SafetyError(f"{self._so_far(plan)}: there was no consent; type yes when asked, or give --move")
 
@@ -176,15 +183,12 @@ class Procedure:
     def _again(self, consent: Callable[[Plan], bool]) -> Plan:
         """The plan of what is left, from where the arm is now; agreed to anew if that is not where it was left."""
         at = self._standing(_TO_SETTLE)
-        expected = self.plan.legs[-1].motion.position([0.0])[0]
-        if self.basis.tare is not None:
-            first = self.plan.legs[0].motion
-            expected = first.position([0.0])[0]
+        expected = self.plan.legs[-1 if self.basis.tare is None else 0].motion.position([0.0])[0]
         plan = self._plan(at, empty_run=False)
         if np.abs(at - expected).max() > AT_START:
             self._say("the arm is not where it was left")
             self._allowed(plan, consent)
-        plan.check(self._so_far(plan))
+        self.check(plan)
         return plan
 
     def _standing(self, patience: float) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ It prints one JSON line per event: ready, script, moving, stopped, ended, mounte
 standard input says mount, or `work FILE`: from then on a program of its own follows the motion in that file and rests
 for a while, in turns. A client's script takes that program's place; after it, the program begins anew. Or it names a
 fault, which is printed, too: local (no remote control), refuse (its script ends at a payload), forget (a payload is
-taken and not counted), die (the arm loses its power at a payload).
+taken and not counted), die (the arm loses its power at a payload), slider (at 50 %), protective (stop).
 """
 
 import argparse
@@ -95,6 +95,9 @@ class Robot:
             "actual_qd": dq,
             "target_q": body.target,
             "actual_current": tau / self.constants,
+            "robot_mode": 7,
+            "safety_mode": 3 if self.fault == "protective" else 1,
+            "target_speed_fraction": 0.5 if self.fault == "slider" else 1.0,
             "robot_status_bits": 3 if self.running else 1,
             "runtime_state": 2 if self.running else 1,
             "output_int_register_0": self.ready,

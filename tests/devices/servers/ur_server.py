@@ -31,6 +31,8 @@ def kind(name):
         return INTEGERS[name]
     if name == "payload_cog":
         return "VECTOR3D"
+    if name == "target_speed_fraction":
+        return "DOUBLE"
     six = ("actual_q", "actual_current", "target_", "payload_inertia")
     return "VECTOR6D" if name.startswith(six) else "DOUBLE"
 

@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int | None:
             say=print_note,
         )
         if options.dry_run:
-            procedure.plan.check()
+            procedure.check()
             print_json(procedure.plan.to_dict()) if options.json else print(procedure.plan)
             return None
         found = procedure.run(_consent(options), _mount(options, mover))

@@ -35,6 +35,13 @@ from armload.recording import Sample
 _CYCLE = 1e-3  # [s]
 _LATE = 0.01  # [s] a target may be late, half of what the robot bears
 _SILENCE = 1.0  # [s] without a state after which the robot counts as lost
+# robot modes, by the end of their names in both clients, in which no motion is taken
+_HELD = {
+    "Guiding": "it is guided by hand; let go of its buttons, and switch Desk to execution",
+    "Reflex": "a reflex has stopped it; acknowledge it in Desk",
+    "UserStopped": "its user stop is pressed; release it",
+    "AutomaticErrorRecovery": "it recovers from an error; wait until that is over",
+}
 _UNFILTERED = 1000.0  # [Hz] cut-off frequency at which libfranka leaves commands as they are
 
 
@@ -57,6 +64,7 @@ class FrankaMover(StreamedMover):
         self.name, self.rate = self._source.name, self._source.rate
         self._control: Any = None
         self._target: NDArray[np.float64] | None = None
+        self._mode: str | None = None
         self._arrived: float | None = None
         self._closed = False
 
@@ -64,6 +72,7 @@ class FrankaMover(StreamedMover):
         while not self._closed:
             state = self._state()
             self._arrived, self._target = time.monotonic(), np.array(state.q_d)
+            self._mode = state.robot_mode.name
             sample = Sample(state.time.to_sec(), np.array(state.q), np.array(state.dq), np.array(state.tau_J))
             movement = self._took(sample, partial(float, sample.t))
             if self._control is not None:
@@ -74,6 +83,11 @@ class FrankaMover(StreamedMover):
                     self._brakes(movement, t)
                     self._write(movement.target(t + _CYCLE))
             yield sample
+
+    def hindrance(self) -> str | None:
+        """What its mode says."""
+        mode: str = self._mode or self._source.state().robot_mode.name
+        return _HELD.get(mode.removeprefix("k"))
 
     def commanded(self) -> NDArray[np.float64]:
         """Where the controller holds the arm, q (n,) [rad]."""

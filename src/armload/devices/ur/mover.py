@@ -9,6 +9,7 @@ network between.
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -18,9 +19,9 @@ from numpy.typing import NDArray
 
 from armload.arms import Arm
 from armload.devices.load import Load
-from armload.devices.mover import StreamedMover
+from armload.devices.mover import Movement, StreamedMover
 from armload.devices.supervision import Thresholds
-from armload.devices.ur import writer
+from armload.devices.ur import modes, writer
 from armload.devices.ur.controller import URController
 from armload.devices.ur.source import URSource, load_control
 from armload.errors import ArmloadError, SafetyError, SinkError, SourceError, one_line
@@ -51,9 +52,9 @@ class URMover(StreamedMover):
         super().__init__(arm)
         self._address, self._control = address, None
         load_control()  # what is missing is said before anything moves
-        self._source = URSource(address, arm, torque_constants, ("target_q",))
+        self._source = URSource(address, arm, torque_constants, ("target_q", *modes.FIELDS))
         self.name, self.rate = self._source.name, self._source.rate
-        self._hold: NDArray[np.float64] | None = None
+        self._sent: float | None = None  # when the newest target was, on our clock [s]
 
     def __iter__(self) -> Iterator[Sample]:
         for sample in self._source:
@@ -66,6 +67,10 @@ class URMover(StreamedMover):
                 self._release()
             yield sample
 
+    def hindrance(self) -> str | None:
+        """What its modes and its speed slider say."""
+        return modes.hindrance(self._source.client)
+
     def commanded(self) -> NDArray[np.float64]:
         """Where the controller holds the arm, q (n,) [rad]."""
         return np.array(self._source.client.getTargetQ())
@@ -73,6 +78,7 @@ class URMover(StreamedMover):
     def follow(self, motion: Motion, thresholds: Thresholds | None = None) -> None:
         """Begin a movement with the next state."""
         super().follow(motion, thresholds)
+        self._sent = None
         try:
             self._control = load_control()(self._address, 1.0 / _CYCLE)
             self._control.setWatchdog(_WATCHDOG)
@@ -113,8 +119,22 @@ class URMover(StreamedMover):
     def _servo(self, q: NDArray[np.float64]) -> None:
         if self._control is None:  # it was let go of on its way, by `close`
             raise SourceError(f"{self.name} was closed while the arm was on its way")
+        before, now = self._sent, time.monotonic()
+        self._sent = now
         if not self._control.servoJ(q.tolist(), 0.0, 0.0, _CYCLE, _LOOKAHEAD, _GAIN):
+            silent = time.monotonic() - (now if before is None else before)
+            if silent > 1.0 / _WATCHDOG:
+                raise SourceError(
+                    f"{self.name} was stopped by its watchdog: no target was sent for {silent:.2f} s, expected less "
+                    f"than {1.0 / _WATCHDOG:g} s (this process did not run); see what held it up, and give this "
+                    "machine less other work"
+                )
             raise SourceError(f"{self.name} takes no more targets: its program has stopped; look at its pendant")
+
+    def _went_on(self, movement: Movement, passed: float) -> None:
+        """Servoj has stood at the last target: the next one is a cycle along the path, however late it is."""
+        assert movement.begun is not None
+        movement.begun += passed - _CYCLE
 
     def _release(self) -> None:
         control, self._control = self._control, None

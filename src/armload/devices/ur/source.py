@@ -29,6 +29,7 @@ from armload.runtime.extras import install
 _FIELDS = ["timestamp", "actual_q", "actual_qd", "actual_current"]
 _LOOK = 2e-4  # [s] between two looks for the next sample
 _SILENCE = 1.0  # [s] after which the arm counts as lost
+_PAUSED = 0.1  # of that counts at most between two looks: what is longer, this process (and its client) did not run
 _SEE = "see that the robot is switched on, its cable is in, and RTDE is enabled in its security settings"
 
 
@@ -79,22 +80,22 @@ class URSource(Source):
         self.rate = 500.0
 
     def __iter__(self) -> Iterator[Sample]:
-        client, last, heard = self.client, None, time.monotonic()
+        client, last, silent, looked = self.client, None, 0.0, time.monotonic()
         while not self._stop.is_set():
-            t = client.getTimestamp()
+            t, now = client.getTimestamp(), time.monotonic()
+            silent, looked = silent + min(now - looked, _PAUSED * _SILENCE), now
             if t == last:
-                silent = time.monotonic() - heard
                 if not client.isConnected():
                     raise SourceError(f"{self.name} was lost: it closed the connection; {_SEE}")
                 if silent > _SILENCE:
                     raise SourceError(f"{self.name} was lost: no sample for {silent:.1f} s; {_SEE}")
                 self._stop.wait(_LOOK)
                 continue
-            heard = time.monotonic()
+            silent = 0.0
             q, dq, current = client.getActualQ(), client.getActualQd(), client.getActualCurrent()
             if client.getTimestamp() != t:
                 continue  # the next packet came in between: the values may be of either
-            last, self._arrived = t, heard
+            last, self._arrived = t, now
             yield Sample(float(t), np.array(q), np.array(dq), self._constants * current)
 
     def arrived(self) -> float | None:
