@@ -80,17 +80,20 @@ class URSource(Source):
 
     def __iter__(self) -> Iterator[Sample]:
         client, last, heard = self.client, None, time.monotonic()
+        looked = heard
         while not self._stop.is_set():
-            t = client.getTimestamp()
+            t, before, looked = client.getTimestamp(), looked, time.monotonic()
             if t == last:
-                silent = time.monotonic() - heard
+                if looked - before > _SILENCE:  # nobody looked: this process did not run, and neither did the client
+                    heard = looked
+                silent = looked - heard
                 if not client.isConnected():
                     raise SourceError(f"{self.name} was lost: it closed the connection; {_SEE}")
                 if silent > _SILENCE:
                     raise SourceError(f"{self.name} was lost: no sample for {silent:.1f} s; {_SEE}")
                 self._stop.wait(_LOOK)
                 continue
-            heard = time.monotonic()
+            heard = looked
             q, dq, current = client.getActualQ(), client.getActualQd(), client.getActualCurrent()
             if client.getTimestamp() != t:
                 continue  # the next packet came in between: the values may be of either
