@@ -202,12 +202,17 @@ def test_the_process_refuses_as_main_does():
     assert "no_such_log.csv" in done.stderr
 
 
-@pytest.mark.parametrize("argv", [["--help"], ["methods"]], ids=["text", "a table"])
-def test_a_reader_that_left_is_not_complained_about(argv):
+@pytest.mark.parametrize(
+    ("argv", "unbuffered"),
+    [(["--help"], ""), (["methods"], ""), (["--version"], ""), (["--version"], "1")],
+    ids=["text", "a table", "the version", "the version as it is printed"],
+)
+def test_a_reader_that_left_is_not_complained_about(argv, unbuffered):
     read, write = os.pipe()
     os.close(read)
+    command, environment = [sys.executable, "-m", "armload", *argv], {**os.environ, "PYTHONUNBUFFERED": unbuffered}
     try:
-        done = subprocess.run([sys.executable, "-m", "armload", *argv], stdout=write, stderr=subprocess.PIPE)
+        done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, env=environment)
     finally:
         os.close(write)
     assert (done.returncode, done.stderr) == (141, b"")

@@ -50,3 +50,22 @@ def test_a_family_is_a_kind_of_payload_that_somebody_may_know(names, capsys):
     said = capsys.readouterr().err
     assert "expected some of boxes, shapes, tools, container, wide, light" in said
     assert "anything, " not in said  # a part of the learned prior, and no kind of payload
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_says_of_each_option_what_it_is_and_what_holds_without_it(command):
+    for option in options_of(importlib.import_module(f"armload.app.cli.{command}").parser()):
+        assert option.help, option.option_strings
+        if option.default not in (None, False, argparse.SUPPRESS, [], ()):
+            assert "default: " in option.help, option.option_strings
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_line_of_help_is_wider_than_a_page(command, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    parsers = [importlib.import_module(f"armload.app.cli.{command}").parser()]
+    for action in list(parsers[0]._actions):
+        parsers += action.choices.values() if isinstance(action, argparse._SubParsersAction) else ()
+    for parser in parsers:
+        before, _, _ = parser.format_help().partition("examples:")  # a command stays one line
+        assert max(map(len, before.split("\n"))) <= 110, parser.prog

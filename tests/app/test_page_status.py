@@ -233,11 +233,14 @@ def test_the_age_of_a_tare_is_counted_from_when_it_was_taken_or_recorded(panda, 
     now = monotonic()
     monkeypatch.setattr("time.time", lambda: 1.7e9 + float(log.t[-1]) + 600.0)
     monkeypatch.setattr("time.monotonic", lambda: now)
-    assert watcher.look().tare == "empty.csv, 10 min old"
+    assert watcher.look().tare == "empty.csv, recorded 10 min ago"  # what is replayed may be as old
     for tare, words in (
         (Tare(log, age=7200.0, given=now - 1.0), "empty.csv, 2 h old"),  # as somebody said
         (Tare(log, taken=True, given=now - 15.0), "taken 15.0 s ago"),
-        (Tare(replace(log, epoch=0.0, t=1.7e9 + log.t), given=now), "empty.csv, 10 min old"),  # times since 1970
+        (
+            Tare(replace(log, epoch=0.0, t=1.7e9 + log.t), given=now),
+            "empty.csv, recorded 10 min ago",
+        ),  # times since 1970
         (Tare(replace(log, epoch=5e3), given=now), "empty.csv, which does not say when it was recorded"),  # since boot
         (Tare(replace(log, epoch=0.0), given=now), "empty.csv, which does not say when it was recorded"),
     ):

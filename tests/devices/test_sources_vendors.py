@@ -5,10 +5,12 @@ import json
 import os
 import re
 import runpy
+import signal
 import socket
 import struct
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -333,3 +335,18 @@ def test_a_ur_arm_gives_positions_velocities_and_currents_as_torque(address, tmp
     np.testing.assert_allclose(rows[:, 13:], run.tau[place], rtol=1e-12)
     assert len(place) > 0.2 * len(t)  # the client keeps only the newest
     assert len(read_recording(tmp_path / "run.csv", robot)) == len(place)
+
+
+def test_a_reader_that_did_not_run_for_a_while_has_not_lost_its_ur_arm(address, tmp_path):
+    pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
+    robot = arm("ur10e")
+    t = 100.0 + np.arange(3000) / 500.0
+    log = {"timestamp": t, **dict.fromkeys(("actual_q", "actual_qd", "actual_current"), np.zeros((3000, 6)))}
+    with serving("ur_server", log, address, tmp_path), open_source(f"ur://{address}", robot) as source:
+        samples = iter(source)
+        before = next(samples).t
+        source.process.send_signal(signal.SIGSTOP)
+        time.sleep(1.5)
+        source.process.send_signal(signal.SIGCONT)
+        while (now := next(samples).t) < before + 1.5:
+            assert now >= before

@@ -132,7 +132,7 @@ def test_a_broker_that_refuses_or_is_not_there_is_said_once(caplog):
     while not caplog.messages and time.monotonic() < end:
         time.sleep(0.02)
     mqtt.close()
-    assert caplog.messages == ["the MQTT broker cannot be reached; it is tried again"]
+    assert caplog.messages == ["the MQTT broker cannot be reached: Connection refused; it is tried again"]
 
 
 def test_a_password_is_in_no_message():

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import json
+import sys
 from collections.abc import Mapping
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from armload.errors import UsageError
 from armload.runtime.extras import install
-from armload.service.receiver import Health, is_host, without_user
+from armload.service.receiver import Health, is_host, unreachable, without_user
 
 _KEPT = 1000  # messages that wait; then new ones are dropped
 _LONGEST = 60  # [s] between two trials to connect
@@ -90,7 +91,9 @@ class Mqtt:
         return self._client.publish(f"{self._prefix}/online", so, qos=qos, retain=True)
 
     def _absent(self, *_: Any) -> None:
-        self.health.tell("cannot be reached; it is tried again")
+        error = sys.exc_info()[1]  # paho calls while it handles it
+        why = f": {unreachable(error)}" if isinstance(error, Exception) else ""
+        self.health.tell(f"cannot be reached{why}; it is tried again")
 
     def _lost(self, _client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         if reason.is_failure and self.health.failed is None:  # what was refused has been said

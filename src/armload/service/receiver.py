@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import logging
 import re
+import ssl
+import urllib.error
+
+from armload.errors import one_line
 
 _USER = re.compile(r"(?<=//).*@", re.DOTALL)  # of an address: a name, perhaps a password with any character in it
 
@@ -50,6 +54,22 @@ class Health:
 
     def _log(self, said: str) -> None:
         logging.getLogger("armload").warning("%s %s", self._what, said)
+
+
+def unreachable(error: Exception) -> str:
+    """Why a receiver cannot be reached, for a log line; with what to do where its certificate is refused.
+
+    >>> unreachable(ConnectionRefusedError(111, "Connection refused"))
+    'Connection refused'
+    """
+    if isinstance(error, urllib.error.URLError) and isinstance(error.reason, Exception):
+        error = error.reason
+    if isinstance(error, ssl.SSLCertVerificationError):
+        return (
+            f"its certificate is refused ({error.verify_message.rstrip('.')}): it needs one for its name, of an issuer "
+            "that this machine trusts (SSL_CERT_FILE names a file of them)"
+        )
+    return (error.strerror if isinstance(error, OSError) else None) or one_line(error)
 
 
 def without_user(url: str) -> str:

@@ -15,10 +15,10 @@ from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnec
 from typing import Any
 from urllib.parse import urlsplit
 
-from armload.errors import UsageError, one_line
+from armload.errors import UsageError
 from armload.service.backoff import Backoff
 from armload.service.in_time import InTime
-from armload.service.receiver import Health, is_host, without_user
+from armload.service.receiver import Health, is_host, unreachable, without_user
 
 _ANSWERED = 5.0  # [s] a receiver may take
 _LONGEST = 60.0  # [s] between two trials
@@ -146,7 +146,7 @@ class Webhook:
             if 300 <= error.code < 400:
                 failed += ", that it is elsewhere: give the address it is at"
         except (OSError, ValueError, HTTPException) as error:
-            taken, failed = None, f"did not answer: {one_line(error)}"
+            taken, failed = None, f"did not answer: {unreachable(error)}"
         self.health.tell(failed)
         if taken is False:
             self.health.drop()

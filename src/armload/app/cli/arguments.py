@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import textwrap
 from collections.abc import Callable
 from importlib import resources
 from typing import NoReturn, TypeVar
@@ -24,6 +25,8 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one sentence without usage, and whose help keeps its line breaks."""
 
     def __init__(self, **settings) -> None:
+        lines = (settings.get("description") or "").split("\n")  # which argparse leaves as wide as they are
+        settings["description"] = "\n".join(x if x.startswith(" ") else textwrap.fill(x, _width()) for x in lines)
         super().__init__(allow_abbrev=False, formatter_class=_Help, **settings)
 
     def print_help(self, file=None) -> None:
@@ -37,9 +40,12 @@ class Parser(argparse.ArgumentParser):
 
 class _Help(argparse.RawDescriptionHelpFormatter):
     def __init__(self, prog: str) -> None:
-        # as wide as a narrow terminal is, less argparse's own margin; elsewhere, as in a pipe, lines of 110 characters
-        width = shutil.get_terminal_size((_HELP + 2, 24)).columns - 2
-        super().__init__(prog, max_help_position=28, width=min(width, _HELP))
+        super().__init__(prog, max_help_position=28, width=_width())
+
+
+def _width() -> int:
+    """Of a line of help: as a narrow terminal is, less argparse's own margin; elsewhere, as in a pipe, `_HELP`."""
+    return min(shutil.get_terminal_size((_HELP + 2, 24)).columns - 2, _HELP)
 
 
 def attach_values(arguments: list[str]) -> list[str]:

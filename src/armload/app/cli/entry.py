@@ -16,6 +16,7 @@ imports what it needs when it runs, so that `armload --help` costs nothing.
 from __future__ import annotations
 
 import _thread
+import argparse
 import difflib
 import importlib
 import logging
@@ -26,6 +27,7 @@ import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import NoReturn
 
 from armload.app.cli.arguments import Parser, attach_values
 from armload.app.cli.outputs import check_outputs
@@ -206,6 +208,14 @@ def _run(arguments: list[str]) -> int:
     return module.run(options) or 0
 
 
+class _Version(argparse.Action):
+    """Print the version and end; argparse's own hides that it cannot be written."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        print(f"armload {__version__}")
+        parser.exit()
+
+
 def _overview() -> Parser:
     width = max(map(len, COMMANDS))
     commands = "\n".join(f"  {name:<{width}}  {text}" for name, text in COMMANDS.items())
@@ -216,7 +226,7 @@ def _overview() -> Parser:
         f"commands:\n{commands}",
         epilog=_EXAMPLES,
     )
-    parser.add_argument("--version", action="version", version=f"armload {__version__}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show armload's version and exit")
     return parser
 
 

@@ -92,7 +92,7 @@ def parser() -> Parser:
         "--every",
         type=at_least(0.0, float),
         metavar="S",
-        help="with --headless: seconds between lines (0.1)",
+        help="with --headless: seconds between lines (default: 0.1)",
     )
     add(
         "--learn",
@@ -110,7 +110,7 @@ def parser() -> Parser:
         type=_speed,
         default=_UNSAID,
         metavar="X|max",
-        help="of a log or the simulator (1: real time)",
+        help="of a log or the simulator (default: 1, real time)",
     )
     add("--loop", action="store_true", help="replay a log again and again")
     add(
@@ -119,7 +119,7 @@ def parser() -> Parser:
         metavar="S",
         help="take so many seconds of samples (a page stays open)",
     )
-    add("--host", metavar="H", help="interface of the page (127.0.0.1); others ask for a token")
+    add("--host", metavar="H", help="interface of the page (default: 127.0.0.1); others ask for a token")
     add(
         "--token-file",
         type=file_name,
@@ -130,7 +130,7 @@ def parser() -> Parser:
         "--port",
         type=at_least(0, int, 65535),
         metavar="P",
-        help="of the page (8080, or the next free one)",
+        help="of the page (default: 8080, or the next free one)",
     )
     return parser
 

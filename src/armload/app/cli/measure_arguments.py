@@ -70,13 +70,19 @@ def parser() -> Parser:
         metavar="MOTION",
         help="taie2024, a JSON, CSV or YAML file, or random:SEED (default: designed about the present pose)",
     )
-    add("--time", type=at_least(0.2, float, 60.0), default=2.0, metavar="S", help="of a motion that is designed (2)")
+    add(
+        "--time",
+        type=at_least(0.2, float, 60.0),
+        default=2.0,
+        metavar="S",
+        help="of a motion that is designed (default: 2)",
+    )
     add(
         "--tool-speed",
         type=at_least(0.01, float),
         default=0.5,
         metavar="V",
-        help="of the payload frame in a motion that is designed, at most [m/s] (0.5)",
+        help="of the payload frame in a motion that is designed, at most [m/s] (default: 0.5)",
     )
     add("--dry-run", action="store_true", help="connect, say what would move and check it; move nothing")
     add("--move", action="store_true", help="move without asking: for who has seen the dry run")
@@ -98,7 +104,13 @@ def parser() -> Parser:
     add("--grip", type=command, metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
     add_column_arguments(parser)
     safety = parser.add_argument_group("what is allowed").add_argument
-    safety("--floor", type=floor, default=0.0, metavar="Z|none", help="height of the floor in the base's frame [m] (0)")
+    safety(
+        "--floor",
+        type=floor,
+        default=0.0,
+        metavar="Z|none",
+        help="height of the floor in the base's frame [m], or none (default: 0)",
+    )
     safety(
         "--box",
         type=box,
@@ -107,8 +119,15 @@ def parser() -> Parser:
         metavar="X,Y,Z,SX,SY,SZ",
         help="an obstacle in the base's frame [m]; repeat for more",
     )
-    safety("--approach", type=at_least(0.0, float), metavar="RAD", help="how far a joint may be from the start (1)")
-    safety("--off-path", type=at_least(1e-3, float), default=0.05, metavar="RAD", help="more stops the arm (0.05)")
+    safety(
+        "--approach",
+        type=at_least(0.0, float),
+        metavar="RAD",
+        help="how far a joint may be from the start (default: 1)",
+    )
+    safety(
+        "--off-path", type=at_least(1e-3, float), default=0.05, metavar="RAD", help="more stops the arm (default: 0.05)"
+    )
     safety(
         "--push",
         type=at_least(0.01, float),
@@ -126,9 +145,12 @@ def parser() -> Parser:
         help="--apply writes inertia that the runs did not determine, too",
     )
     sim = parser.add_argument_group("the simulator (sim)").add_argument
-    sim("--payload", default="test", metavar="FILE", help="what is mounted: JSON, franka-hand, or test (test)")
+    sim("--payload", default="test", metavar="FILE", help="what is mounted: JSON, franka-hand, or test (default: test)")
     sim(
-        "--world", default="real-like:0", metavar="W", help="the arm as it is: nominal, or real-like:SEED (real-like:0)"
+        "--world",
+        default="real-like:0",
+        metavar="W",
+        help="the arm as it is: nominal, or real-like:SEED (default: real-like:0)",
     )
     sim(
         "--at",
@@ -136,8 +158,8 @@ def parser() -> Parser:
         metavar="Q1,…",
         help="where it stands [rad] (default: where the motion begins, else near the middle of the joints)",
     )
-    sim("--speed", type=_speed, default=1.0, metavar="X|max", help="1: real time")
-    sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
+    sim("--speed", type=_speed, default=1.0, metavar="X|max", help="of the simulated arm (default: 1, real time)")
+    sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (default: 0)")
     return parser
 
 

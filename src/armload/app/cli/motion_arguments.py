@@ -109,7 +109,14 @@ def add_constraint_arguments(
         metavar="Z",
         help="height of the floor in the base's frame [m], or none (default: 0)",
     )
-    add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
+    add(
+        "--box",
+        type=box,
+        action="append",
+        default=[],
+        metavar="X,Y,Z,SX,SY,SZ",
+        help="an obstacle in the base's frame [m]; repeat for more",
+    )
     add(
         "--held",
         type=held,

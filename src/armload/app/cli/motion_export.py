@@ -26,8 +26,18 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     add("motion", metavar="MOTION", help="taie2024, a JSON, CSV or YAML file, or random:SEED")
     add_arm_arguments(parser, default=_DEFAULT)
     parser.set_defaults(robot=None)  # a table names no joints: only an arm that is named must fit
-    add("--format", required=True, choices=("csv", "ros2", "ur"))
-    add("--rate", type=at_least(1e-3, float, 1e4), metavar="HZ", help="samples per second")
+    add(
+        "--format",
+        required=True,
+        choices=("csv", "ros2", "ur"),
+        help="a table, a ROS 2 trajectory, or a program for UR robots",
+    )
+    add(
+        "--rate",
+        type=at_least(1e-3, float, 1e4),
+        metavar="HZ",
+        help="samples per second (default: 1000 for csv, 100 for ros2, 500 for ur)",
+    )
     add("--out", type=output_file, metavar="FILE", help="file to write (default: standard output)")
     add = parser.add_argument_group("from the present pose").add_argument
     add(
@@ -42,8 +52,21 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         "--approach", type=at_least(0.0, float, 10.0), metavar="RAD", help="farthest of a joint from there (default: 1)"
     )
     add("--payload", type=at_least(0.0, float), metavar="KG", help="heaviest on the way (default: as rated)")
-    add("--floor", type=floor, default=_FLOOR, metavar="Z", help="height of the floor [m], or none (default: 0)")
-    add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
+    add(
+        "--floor",
+        type=floor,
+        default=_FLOOR,
+        metavar="Z",
+        help="height of the floor in the base's frame [m], or none (default: 0)",
+    )
+    add(
+        "--box",
+        type=box,
+        action="append",
+        default=[],
+        metavar="X,Y,Z,SX,SY,SZ",
+        help="an obstacle in the base's frame [m]; repeat for more",
+    )
 
 
 def run_export(options: argparse.Namespace) -> int:

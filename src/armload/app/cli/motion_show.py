@@ -30,11 +30,24 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     add("--figure", type=output_file, metavar="F.png", help="draw the joints against their limits")
     add("--page", action="store_true", help="a page in the browser on which the arm runs the motion, until Ctrl-C")
     add = parser.add_argument_group("with --page").add_argument
-    add("--host", metavar="H", help="interface of the page (127.0.0.1)")
-    add("--port", type=at_least(0, int, 65535), metavar="P", help="of the page (8080, or the next free one)")
-    add("--floor", type=floor, default=0.0, metavar="Z", help="height of the floor [m], or none (0)")
-    add("--box", type=box, action="append", default=[], metavar="X,Y,Z,SX,SY,SZ", help="an obstacle; repeat for more")
-    add("--held", type=held, metavar="R|SX,SY,SZ", help="what is held, as of `motion design` (0.15)")
+    add("--host", metavar="H", help="interface of the page (default: 127.0.0.1)")
+    add("--port", type=at_least(0, int, 65535), metavar="P", help="of the page (default: 8080, or the next free one)")
+    add(
+        "--floor",
+        type=floor,
+        default=0.0,
+        metavar="Z",
+        help="height of the floor in the base's frame [m], or none (default: 0)",
+    )
+    add(
+        "--box",
+        type=box,
+        action="append",
+        default=[],
+        metavar="X,Y,Z,SX,SY,SZ",
+        help="an obstacle in the base's frame [m]; repeat for more",
+    )
+    add("--held", type=held, metavar="R|SX,SY,SZ", help="what is held, as of `motion design` (default: 0.15)")
 
 
 def run_show(options: argparse.Namespace) -> int:

@@ -54,17 +54,25 @@ def parser() -> Parser:
         type=file_name,
         default="/joint_states",
         metavar="T",
-        help="of the joint states (/joint_states); with ?torque_constants=… or ?compensated=PAYLOAD, where effort is "
-        "no joint torque",
+        help="of the joint states (default: /joint_states); with ?torque_constants=… or ?compensated=PAYLOAD, "
+        "where effort is no joint torque",
     )
     node.add_argument(
-        "--publish", type=file_name, default="/payload/inertia", metavar="T", help="of the payload (/payload/inertia)"
+        "--publish",
+        type=file_name,
+        default="/payload/inertia",
+        metavar="T",
+        help="of the payload (default: /payload/inertia)",
     )
     add_identifier_arguments(node)
     add_tare_age_argument(node)
     node.add_argument("--columns", type=file_name, metavar="SPEC", help=f"of the tare: {COLUMNS}")
     node.add_argument(
-        "--rate", type=at_least(0.01, float, 1000.0), default=10.0, metavar="HZ", help="messages per second (10)"
+        "--rate",
+        type=at_least(0.01, float, 1000.0),
+        default=10.0,
+        metavar="HZ",
+        help="messages per second (default: 10)",
     )
     node.add_argument(
         "--timeout",
@@ -81,7 +89,10 @@ def parser() -> Parser:
     )
     add_arm_arguments(simulate)
     simulate.add_argument(
-        "--payload", type=file_name, metavar="FILE", help="what it holds: a JSON file, franka-hand, or test (nothing)"
+        "--payload",
+        type=file_name,
+        metavar="FILE",
+        help="what it holds: a JSON file, franka-hand, or test (default: nothing)",
     )
     simulate.add_argument(
         "--motion",
@@ -89,25 +100,39 @@ def parser() -> Parser:
         help="taie2024, a JSON file, or random:SEED, repeated until a trajectory comes (default: stand)",
     )
     simulate.add_argument(
-        "--world", default="nominal", metavar="W", help="the arm as it is: nominal, or real-like:SEED (nominal)"
+        "--world",
+        default="nominal",
+        metavar="W",
+        help="the arm as it is: nominal, or real-like:SEED (default: nominal)",
     )
     simulate.add_argument(
-        "--noise", action=argparse.BooleanOptionalAction, default=True, help="sensors as measured on real robots"
+        "--noise",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="sensors as measured on real robots, or ideal ones (default: --noise)",
     )
     simulate.add_argument(
-        "--rate", type=at_least(20.0, float, 1000.0), default=200.0, metavar="HZ", help="joint states per second (200)"
+        "--rate",
+        type=at_least(20.0, float, 1000.0),
+        default=200.0,
+        metavar="HZ",
+        help="joint states per second (default: 200)",
     )
     simulate.add_argument(
-        "--topic", type=file_name, default="/joint_states", metavar="T", help="of the joint states (/joint_states)"
+        "--topic",
+        type=file_name,
+        default="/joint_states",
+        metavar="T",
+        help="of the joint states (default: /joint_states)",
     )
     simulate.add_argument(
         "--command",
         type=file_name,
         default="/joint_trajectory_controller/joint_trajectory",
         metavar="T",
-        help="of the trajectories (/joint_trajectory_controller/joint_trajectory)",
+        help="of the trajectories (default: /joint_trajectory_controller/joint_trajectory)",
     )
-    simulate.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (0)")
+    simulate.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (default: 0)")
     return parser
 
 

@@ -66,7 +66,7 @@ def parser() -> Parser:
     add_tool_argument(parser)
     add("--save", type=output_folder, metavar="DIR", help="keep the state in this folder, every minute")
     add("--loop", action="store_true", help="replay a log again and again")
-    add("--every", type=at_least(0.0, float), metavar="S", help="seconds between lines of an arm (0.1)")
+    add("--every", type=at_least(0.0, float), metavar="S", help="seconds between lines of an arm (default: 0.1)")
     add(
         "--apply",
         choices=("auto",),
@@ -79,7 +79,7 @@ def parser() -> Parser:
         help="what was on the flange at the tare, which the controller must count, too",
     )
     add("--quiet", action="store_true", help="no lines on stdout but alarms")
-    add("--host", metavar="H", help="interface of the endpoint (127.0.0.1); others need --token-file")
+    add("--host", metavar="H", help="interface of the endpoint (default: 127.0.0.1); others need --token-file")
     add(
         "--port",
         type=at_least(0, int, 65535),

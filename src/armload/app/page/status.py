@@ -92,7 +92,8 @@ def _tare_in_words(tare: Tare) -> str:
     if tare.age:
         return f"{log.source}, {in_words(age)} old"
     if log.date is not None:
-        return f"{log.source}, {in_words(max(time.time() - log.date - log.duration, 0.0))} old"
+        # of when what is shown is, nobody knows: a log that is replayed may be as old
+        return f"{log.source}, recorded {in_words(max(time.time() - log.date - log.duration, 0.0))} ago"
     return f"{log.source}, which does not say when it was recorded"
 
 
