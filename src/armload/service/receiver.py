@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 
+KEPT = 1000  # messages that wait for a receiver: an hour of alarms every four seconds
 _USER = re.compile(r"(?<=//).*@", re.DOTALL)  # of an address: a name, perhaps a password with any character in it
 
 
