@@ -29,7 +29,6 @@ from armload.devices import (
     ur_payload,
 )
 from armload.devices.franka import writer as franka_robot
-from armload.devices.franka.form import desk_text
 from armload.devices.kuka.form import kuka_load
 from armload.devices.load_remarks import HARDLY_KNOWN, leaning
 from armload.devices.ur import writer as ur_robot
@@ -150,14 +149,7 @@ def test_desk_s_end_effector_has_the_keys_of_the_public_example_and_its_matrices
     example = {"mass": 0.9, "centerOfMass": [0] * 3, "transformation": [0] * 16, "inertia": [0] * 9}
     assert {k: np.shape(v) for k, v in read.items()} == {k: np.shape(v) for k, v in example.items()}
     assert_is_the_body(read["mass"], read["centerOfMass"], np.reshape(read["inertia"], (3, 3), order="F"))
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = TURN, [0.1, 0.2, 0.3]
-    columns = json.loads(desk_text(Load(skew_body()), pose))["transformation"]
-    assert columns[3::4] == [0, 0, 0, 1]  # by rows this would be the translation
-    assert columns[12:15] == [0.1, 0.2, 0.3]
-    np.testing.assert_array_equal(np.reshape(columns, (4, 4)).T[:3, :3], TURN)
-    with pytest.raises(SinkError, match="transformation is not a pose"):
-        desk_text(Load(skew_body()), np.ones((4, 4)))
+    np.testing.assert_array_equal(np.reshape(read["transformation"], (4, 4)), np.eye(4))  # the flange itself
 
 
 # ---------------------------------------------------------------------- Universal Robots

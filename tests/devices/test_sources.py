@@ -17,7 +17,7 @@ import pytest
 
 from armload.arms import arm
 from armload.devices import Detached, Recorded, Recorder, Replay, Ring, RingReader, Simulator, open_mover, open_source
-from armload.devices.order import (
+from armload.devices.as_json import (
     arm_from_json,
     arm_to_json,
     parameters_from_json,

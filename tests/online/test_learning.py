@@ -150,7 +150,7 @@ def test_nothing_is_learned_from_another_arm_and_it_is_said_within_a_minute(pand
 def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profile, monkeypatch):
     answers = iter([True])  # found once; the evidence falls back afterwards
     monkeypatch.setattr(checked_solver, "FROM", 5.0)
-    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(0.0, 9.0, 1.0, -9.0, next(answers, False)))
+    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(0.0, -9.0, next(answers, False)))
     said = []
     held = [(0.0, None), (18.0, draw_payload("boxes", 3, 1.5))]  # its new run has not asked yet
     last, learned = streamed(panda, world, profile, held, lambda stream: said.append(stream.arm_changed is not None))
@@ -167,7 +167,7 @@ def test_an_arm_that_was_once_found_to_be_another_stays_one(panda, world, profil
 def test_an_arm_that_is_found_to_be_another_amid_changes_is_not_its_profile_s(panda, world, profile, monkeypatch):
     changed = []
     monkeypatch.setattr(checked_solver, "FROM", 2.0)
-    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(0.0, 9.0, 1.0, -9.0, bool(changed)))
+    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(0.0, -9.0, bool(changed)))
     held = [(0.0, None), (6.0, draw_payload("boxes", 3, 1.5))]
     last, _ = streamed(
         panda, world, profile, held, lambda stream: changed.extend([1] * (stream.relative_to == "before"))
@@ -181,7 +181,7 @@ def test_an_arm_that_is_found_to_be_another_amid_changes_is_not_its_profile_s(pa
 def test_an_end_says_once_that_the_arm_is_not_its_profile_s(panda, world, profile, monkeypatch, found):
     verdicts = iter([True, found])  # while the stream goes on, and at its end
     monkeypatch.setattr(checked_solver, "FROM", 3.0)
-    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(9.0, 0.0, 1.0, 9.0, next(verdicts, found)))
+    monkeypatch.setattr(checked_solver, "another_arm", lambda *_: AnotherArm(9.0, 9.0, next(verdicts, found)))
     log = simulate(panda, random_motion(panda, 3, duration=8.0), world=world, rate=100.0).between(0.0, 5.0)
     stream = OnlineIdentifier(panda, profile=profile)
     for sample in log:

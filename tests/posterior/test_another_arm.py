@@ -127,7 +127,7 @@ def test_the_tare_of_another_arm_is_said_and_the_intervals_hold_without_it(panda
 
 def test_what_the_odds_do_not_say_is_not_said_flatly(panda):
     def said(log_odds):
-        return arm_changed(panda, None, AnotherArm(log_odds, -30.0, 5.0, 5.0, found=True))
+        return arm_changed(panda, None, AnotherArm(log_odds, 5.0, found=True))
 
     assert "it is another one" in said(3.1)
     assert "it may be another one" in said(2.9)

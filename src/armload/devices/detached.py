@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms import Arm
+from armload.devices.as_json import arm_to_json, parameters_to_json, payloads_to_json
 from armload.devices.franka.source import FrankaStatus
-from armload.devices.order import arm_to_json, parameters_to_json, payloads_to_json
 from armload.devices.reader import Reader, columns_of
 from armload.devices.ring import RingReader
 from armload.devices.source import Source

@@ -33,9 +33,9 @@ from typing import Any
 
 import numpy as np
 
+from armload.devices.as_json import arm_from_json, parameters_from_json, payloads_from_json
 from armload.devices.detached import TO_REST
 from armload.devices.opening import open_source, prepare
-from armload.devices.order import arm_from_json, parameters_from_json, payloads_from_json
 from armload.devices.recorder import Recorder
 from armload.devices.remote_mover import RemoteMover
 from armload.devices.ring import Ring

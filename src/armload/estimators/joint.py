@@ -114,13 +114,13 @@ class JointLeastSquares(Identifier):
         return scale * z[:10], 0.5 * (C + C.T)
 
 
-def base_parameters(correction: Correction, seed: int = 0) -> NDArray[np.float64]:
+def base_parameters(correction: Correction) -> NDArray[np.float64]:
     """B (p, b): the directions of eta that any motion can show, eta = B·beta, in units of eta's prior spread.
 
     A direction never acts if its momentum and its drift vanish at all states; the right singular vectors of both,
     stacked over random states, tell.
     """
-    rng, limits = np.random.default_rng(seed), correction.arm.limits
+    rng, limits = np.random.default_rng(0), correction.arm.limits
     low, high = np.maximum(limits.position_low, -np.pi), np.minimum(limits.position_high, np.pi)
     q = rng.uniform(low, high, size=(_STATES, correction.arm.n))
     dq = rng.normal(size=q.shape)

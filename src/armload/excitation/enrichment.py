@@ -22,7 +22,7 @@ from armload.arms.units import unit_of
 from armload.errors import MotionError
 from armload.excitation.constraints import Constraints
 from armload.excitation.criterion import Criterion
-from armload.excitation.optimisation import AGAIN, MUCH_SMALLER, Climb
+from armload.excitation.optimisation import AGAIN, INSIDE, MUCH_SMALLER, Climb
 from armload.excitation.surroundings import Surroundings
 from armload.excitation.track import Track
 from armload.excitation.tube import Tube, away, poses
@@ -40,7 +40,6 @@ _ANY = 100.0  # [rad] of --travel: no bound
 _REACH = 0.03  # [rad] that a control point is scaled by
 _POINTS = 100.0  # [Hz] of the path that is handed out
 _SHRINKS, _SHRINK = 40, 0.95
-_INSIDE = 0.999
 _NEARER = 1e-3  # [m] that a change may come nearer to what the path nearly touches
 # no change at all, of which 0 is asked: what no robot repeats. Motion that costs nothing at the flange does so to
 # first order alone
@@ -256,12 +255,12 @@ def _held_back(
         changed = PathMotion.of(_Changed(track, size * c, path.name), _POINTS, f"{path.name}-enriched")
         far, turned = (float(x.max()) for x in away(given, poses(constraints.arm, changed, RATE)))
         over = max(far / distance, turned / angle)
-        inside = over <= _INSIDE
+        inside = over <= INSIDE
         found = [one for one in used(constraints, changed) if one.what != "rest"] if inside else []
         out = _HeldBack(changed, size, far, turned, found)
         if out.passes:
             break
-        size *= _SHRINK if inside else min(_SHRINK, _INSIDE / over)
+        size *= _SHRINK if inside else min(_SHRINK, INSIDE / over)
     return out
 
 

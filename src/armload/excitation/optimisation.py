@@ -47,7 +47,7 @@ STAGES = ((12, 30.0), (30, 200.0), (40, 2000.0))
 MUCH_SMALLER = 0.9
 AGAIN, _SPARE = (20, 20_000.0), 0.002
 _SHRINKS, _SHRINK = 60, 0.97  # how often, and by what at least, a motion is drawn together
-_INSIDE = 0.999  # of each limit that a finished motion may use: room for the rounding of exports
+INSIDE = 0.999  # of each limit that a finished motion may use: room for the rounding of exports
 _STIRRING = 0.02  # [rad] a motion that goes no farther tells nothing
 
 
@@ -220,7 +220,7 @@ def amplitude(constraints: Constraints, lasting: float) -> NDArray[np.float64]:
 
 
 def _pass(constraints: Constraints, motions: Sequence[Motion]) -> bool:
-    return all(used(constraints, motion)[0].share <= _INSIDE for motion in motions)
+    return all(used(constraints, motion)[0].share <= INSIDE for motion in motions)
 
 
 def _size(motion: SplineMotion) -> float:
@@ -231,9 +231,9 @@ def _drawn_together(constraints: Constraints, motion: SplineMotion) -> SplineMot
     """The motion, its way from the start pose made smaller until it passes the check, or is as small as it gets."""
     for _ in range(_SHRINKS):
         worst = used(constraints, motion)[0]
-        if worst.share <= _INSIDE:
+        if worst.share <= INSIDE:
             break
-        motion = replace(motion, control=motion.control * min(_SHRINK, 0.5 * (1.0 + _INSIDE / worst.share)))
+        motion = replace(motion, control=motion.control * min(_SHRINK, 0.5 * (1.0 + INSIDE / worst.share)))
     return motion
 
 
@@ -246,7 +246,7 @@ def _check_worth(constraints: Constraints, motion: SplineMotion) -> None:
     worst = used(constraints, motion)[0]
     went = np.abs(motion(np.linspace(0.0, motion.duration, 200))[0] - constraints.start).max(axis=0)
     farthest, unit = float(went.max()), unit_of("position", bool(constraints.arm.limits.slides[went.argmax()]))
-    if worst.share > _INSIDE or farthest < _STIRRING:
+    if worst.share > INSIDE or farthest < _STIRRING:
         what = f"no joint goes farther than {farthest:.3f} {unit}, as " if farthest < _STIRRING else ""
         raise MotionError(
             f"no motion of {motion.duration:g} s from this pose keeps to the constraints: {what}{worst.text}; start "

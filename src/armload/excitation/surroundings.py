@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from armload.arms import Arm, Capsule, NearestCapsules
 from armload.arms.capsules import Box
 from armload.errors import MotionError
-from armload.motion.collision import PAYLOAD_RADIUS, CapsuleArm, capsule_arm
+from armload.motion.collision import KEPT_FLOOR, KEPT_SELF, PAYLOAD_RADIUS, CapsuleArm, capsule_arm
 
-# [m] clearances that designed motions keep, as random ones do
-FLOOR, SELF, BOXES = 0.05, 0.01, 0.05
-KINDS = ("floor", "itself", "boxes")
+_BOXES = 0.05  # [m] clearance that designed motions keep
 _OF_START = 0.5  # of the start's clearance, where that is less
 
 
@@ -47,7 +45,7 @@ class Surroundings:
     floor: float | None = 0.0
     boxes: tuple[Obstacle, ...] = ()
     held: float | tuple[float, float, float] = PAYLOAD_RADIUS
-    keep: tuple[float, float, float] = (FLOOR, SELF, BOXES)
+    keep: tuple[float, float, float] = (KEPT_FLOOR, KEPT_SELF, _BOXES)
     of_start: float = _OF_START
 
     def __post_init__(self) -> None:

@@ -31,6 +31,7 @@ from armload.arms import ARMS, PAYLOAD_REACH, Arm, Capsule, NearestCapsules, arm
 PAYLOAD_RADIUS = 0.15  # [m]
 _THIN, _THICK = 0.02, 0.04  # radius of an unknown arm's links over the sum of its link lengths
 POSE_FLOOR, POSE_SELF = 0.10, 0.02  # [m] clearances of a pose that a motion may be built around
+KEPT_FLOOR, KEPT_SELF = 0.05, 0.01  # [m] clearances that random and designed motions keep
 _SAME_PLACE = 1e-3  # [m] between joints' origins of arms with the same links
 _ROOM_TO_FOLD = 1.2  # links nearer than this multiple of their radii cannot be kept apart by the joints between them
 

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import MotionError
-from armload.motion.motion import Motion
-
-_SAME_PLACE, _SAME_SPEED = 1e-3, 1e-2  # [rad, rad/s] jumps that a controller does not notice
+from armload.motion.motion import SAME_PLACE, SAME_SPEED, Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +33,7 @@ class EndlessMotion(Motion):
         dq = self.motion.velocity([0.0, self.motion.duration])
         if not self.motion.duration > 0:
             raise MotionError(f"the motion lasts {self.motion.duration} s: expected a positive time")
-        if not (np.allclose(dq[0], dq[1], atol=_SAME_SPEED) and (self.closed or np.allclose(dq, 0, atol=_SAME_SPEED))):
+        if not (np.allclose(dq[0], dq[1], atol=SAME_SPEED) and (self.closed or np.allclose(dq, 0, atol=SAME_SPEED))):
             raise MotionError(
                 "the motion cannot be repeated: expected one that ends as it began, or starts and stops at rest"
             )
@@ -44,7 +42,7 @@ class EndlessMotion(Motion):
     def closed(self) -> bool:
         """Whether it ends where it began."""
         q = self.motion.position([0.0, self.motion.duration])
-        return bool(np.allclose(q[0], q[1], atol=_SAME_PLACE))
+        return bool(np.allclose(q[0], q[1], atol=SAME_PLACE))
 
     @property
     def name(self) -> str:  # type: ignore[override]

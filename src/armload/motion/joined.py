@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.errors import MotionError
-from armload.motion.motion import Motion
-
-_SAME_PLACE, _SAME_SPEED = 1e-3, 1e-2  # [rad, rad/s] jumps that a controller does not notice
+from armload.motion.motion import SAME_PLACE, SAME_SPEED, Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +38,7 @@ class JoinedMotion(Motion):
         for before, after in zip(self.parts, self.parts[1:], strict=False):
             q = before.position([before.duration])[0], after.position([0.0])[0]
             dq = before.velocity([before.duration])[0], after.velocity([0.0])[0]
-            if np.abs(q[1] - q[0]).max() > _SAME_PLACE or np.abs(dq).max() > _SAME_SPEED:
+            if np.abs(q[1] - q[0]).max() > SAME_PLACE or np.abs(dq).max() > SAME_SPEED:
                 raise MotionError(f"{after.name} does not begin at rest where {before.name} ends at rest")
 
     @property

@@ -12,6 +12,7 @@ from armload.runtime.real_numbers import reals
 
 # of a piece, where a check looks: half way a quintic from rest to rest is fastest, near a fifth it accelerates most
 _WITHIN = np.array([0.0, 0.2, 0.5, 0.8])
+SAME_PLACE, SAME_SPEED = 1e-3, 1e-2  # [rad, rad/s] jumps that a controller does not notice
 
 
 class Motion(ABC):

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from armload.arms import Arm, Limits, facts_of
 from armload.errors import MotionError
 from armload.motion.check import check_motion, rated_load
-from armload.motion.collision import POSE_FLOOR, POSE_SELF, CapsuleArm, capsule_arm
+from armload.motion.collision import KEPT_FLOOR, KEPT_SELF, POSE_FLOOR, POSE_SELF, CapsuleArm, capsule_arm
 from armload.motion.fourier import FourierMotion
 from armload.motion.motion_file import shipped_motion
 from armload.runtime.real_numbers import own_reals
@@ -22,7 +22,6 @@ _POSES = 128  # mean poses tried
 _TRIALS = 24  # of them that are followed up with a motion
 _FACTORS = 0.8 ** np.arange(9)  # by which all amplitudes are reduced until nothing touches
 _ENOUGH = 0.6  # a motion reduced no further than this is taken at once; otherwise the least reduced one
-_FLOOR, _SELF = 0.05, 0.01  # [m] clearances kept
 
 
 def excitation(arm: Arm, seed: int = 0) -> FourierMotion:
@@ -94,7 +93,7 @@ def random_motion(
                 break
             trial = motion.scaled(factor)
             clear = model.clearance(trial(np.linspace(0.0, duration, 100))[0], floor)
-            if clear.floor.min() < _FLOOR or clear.self.min() < _SELF:
+            if clear.floor.min() < KEPT_FLOOR or clear.self.min() < KEPT_SELF:
                 continue
             if check_motion(arm, trial, load, floor=floor).ok:
                 best = factor, trial

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -14,6 +13,7 @@ from armload.identification.intervals import Before, phi_interval
 from armload.inertia import is_consistent, phi_to_com
 from armload.online.event import Event
 from armload.online.gate import Health
+from armload.runtime.finite import finite
 
 # what a line of JSON has as it is, before phi and after it
 _FIRST = ("t", "method", "frame", "relative_to", "n_samples", "age", "lag", "since")
@@ -133,8 +133,8 @@ class OnlineEstimate(Estimate):
         return {
             **{name: own[name] for name in _FIRST},
             "phi": self.phi.tolist(),
-            "phi_low": _finite(low),
-            "phi_high": _finite(high),
+            "phi_low": finite(low.tolist()),
+            "phi_high": finite(high.tolist()),
             "interval": self._interval(consistent),
             "determined": self.determined.tolist(),
             "mass": mass,
@@ -151,7 +151,3 @@ class OnlineEstimate(Estimate):
             "clock_jumps": self.health.clock_jumps,
             "notes": list(self.notes),
         }
-
-
-def _finite(values: NDArray[np.float64]) -> list[float | None]:
-    return [x if math.isfinite(x) else None for x in values.tolist()]

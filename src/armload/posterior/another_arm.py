@@ -89,7 +89,7 @@ def another_arm(
         B += _log_evidence(before, scales_before, [b0])
     expected, spread = float(B[1:].mean()), max(float(B[1:].std()), _NAT)
     surprise = (float(B[0]) - expected) / spread
-    return AnotherArm(float(B[0]), expected, spread, surprise, surprise > SURPRISING and B[0] > LEAST)
+    return AnotherArm(float(B[0]), surprise, surprise > SURPRISING and B[0] > LEAST)
 
 
 def apart(

@@ -35,14 +35,12 @@ class Scales:
 class AnotherArm:
     """Whether a run is of another arm than its tare (`posterior.another_arm`).
 
-    log_odds: B, what the run's log evidence gains if the tare is taken for another arm's. expected, spread: mean and
-    standard deviation of B, were the arm the same. surprise: (B − expected) / spread. found: whether it is another.
-    left_out: whether the answer it is of then does without what its tare or profile says of the arm.
+    log_odds: B, what the run's log evidence gains if the tare is taken for another arm's. surprise: by how many of its
+    standard deviations B exceeds its mean, were the arm the same. found: whether it is another. left_out: whether the
+    answer it is of then does without what its tare or profile says of the arm.
     """
 
     log_odds: float
-    expected: float
-    spread: float
     surprise: float
     found: bool
     left_out: bool = True

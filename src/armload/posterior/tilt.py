@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armload.posterior.drift import STEPS
 from armload.posterior.problem import Problem
 from armload.posterior.scales import Posterior, Scales, Tilt
 from armload.posterior.solve import solve
@@ -40,7 +41,6 @@ TURNED, TURNS = np.radians(0.2), 3
 # [s] of all logs before a stream is asked: friction behind gears looks like a base that leans until it has shown, after
 # 0.4 s (test_friction_that_nobody_expects_is_no_base_that_leans)
 ASKED_FROM = 0.7
-_STEPS = 2  # of expectation–maximisation from the scales of the solution that is tested
 
 
 def tilt_of_base(
@@ -56,7 +56,7 @@ def tilt_of_base(
         runs, prior_std, prior, noise: as of `solve`. found: their solution, for its scales.
     """
     start = _wide(found.scales, runs[-1].correction.tilt)
-    there = solve(list(runs), prior_std, prior, noise, _STEPS, start)
+    there = solve(list(runs), prior_std, prior, noise, STEPS, start)
     return _tilt(there.tilt, there.tilt_covariance, noise.overrated)
 
 

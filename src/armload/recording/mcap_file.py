@@ -44,7 +44,7 @@ class McapFile:
             raise RecordingError(
                 f"{path}: MCAP is written through mcap and rosbags, of which one is missing: {install('mcap')}"
             ) from None
-        self._path, self._types = path, dict(topics)
+        self._types = dict(topics)
         store = get_typestore(Stores.ROS2_HUMBLE)
         self._encode = store.serialize_cdr
         self._file = _Whole(path)

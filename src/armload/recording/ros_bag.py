@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from armload.arms import Arm, names_among
 from armload.errors import RecordingError, one_line
 from armload.recording.bag_parts import PART_SUFFIXES, in_order
-from armload.recording.checked import Chunks
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.currents import in_si
 from armload.recording.mcap_file import is_cut_off, mended
 from armload.recording.recording import Recording
+from armload.recording.rows_as_chunks import Chunks
 from armload.recording.steadied import with_velocities_of_positions
 from armload.runtime.extras import missing
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from armload.arms import Arm
 from armload.errors import EpisodesError, NoEpisodesError, RecordingError
 from armload.recording.aliases import EPISODE, QUANTITIES, TIME_UNITS
-from armload.recording.checked import Chunks
 from armload.recording.choice import DATE, TimeColumns
 from armload.recording.column_spec import ColumnSpec
 from armload.recording.columns import checked_recording
 from armload.recording.currents import of_currents
 from armload.recording.mapping import ColumnMap, map_columns
 from armload.recording.recording import GAP, Recording
+from armload.recording.rows_as_chunks import Chunks
 from armload.recording.steadied import with_velocities_of_positions
 from armload.recording.torque_constants import controller_constants
 

@@ -20,7 +20,7 @@ _SHRINK = 0.05  # share of the diagonal in the covariance: few payloads say litt
 _FLOOR = np.array([5e-3] + [5e-4] * 3 + [5e-5] * 6)  # [kg, kg·m, kg·m²] no family is known better than this
 # standard deviations of the weak prior, of what the arm is rated for and [m] from the flange: a rated payload at the
 # length of a gripper and a box. Stated priors
-_LOAD, REACH = 0.5, 0.15
+LOAD, REACH = 0.5, 0.15
 # [kg] that an arm is rated for, above which what it holds is larger than that: bodies of one form and density grow by
 # the cube root of their mass. The most of the built-in arms, for which `REACH` stands; of 250 kg it makes 35 cm. With
 # 15 cm, Iyy and Izz of 40 payloads of 150 to 500 kg, half a metre away, were inside in 60 %, now in all
@@ -47,7 +47,7 @@ def payload_size(arm: Arm) -> float:
 
 def payload_prior_std(arm: Arm) -> NDArray[np.float64]:
     """Standard deviation (10,) of the weak payload prior: half of `rated_mass`, 15 cm times `payload_size` away."""
-    return within_reach(_LOAD * rated_mass(arm), payload_size(arm))
+    return within_reach(LOAD * rated_mass(arm), payload_size(arm))
 
 
 def within_reach(mass: float, size: float = 1.0) -> NDArray[np.float64]:

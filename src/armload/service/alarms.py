@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from armload.inertia import decimals
+from armload.online.thresholds import STEP_STD
+from armload.regression.prior import LOAD
 
 RAISED_AFTER = (
     0.5  # [s] a condition holds before its alarm: longer than the worst estimates of a hand-over at once last
 )
 CLEARED_AFTER = 5.0  # [s] it does not hold before the alarm is over: a limit that is grazed gives one alarm
 STARTS = 30.0  # [s] a source may take to give its first sample: a process, a reader and a robot that connects
-_SHOWN = 0.05  # of the rating: how well a mass is known by far, so that two digits of it are said; as of `online.Event`
 # why an arm is not heard of; all others are of a source that works
 _LOST = ("starting", "source lost", "silent")
 
@@ -91,7 +92,8 @@ class Alarms:
             return None, "", None, None
         mass = answer["mass"]
         over = mass > self.rating
-        shown = f"{mass:.{decimals(_SHOWN * self.rating)}f}"
+        # with the digits of a change (`online.Event`), of an arm of this rating
+        shown = f"{mass:.{decimals(STEP_STD * LOAD * self.rating)}f}"
         return over, f"{shown} kg are held, {self.rating:g} kg are allowed", mass, self.rating
 
     def _com_out_of_range(self, answer: Mapping[str, Any]) -> _Found:

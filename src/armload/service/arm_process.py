@@ -29,10 +29,10 @@ from armload.posterior import load_profile
 from armload.recording import check_own_measurements, read_recording
 from armload.runtime.atomic import kept_alone
 from armload.runtime.compiling import COMPILING, compiling
+from armload.runtime.finite import finite
 from armload.service.absence import Absence
 from armload.service.catching_up import CatchingUp
 from armload.service.feedback import Feedback
-from armload.service.finite import finite
 from armload.service.ready import ready
 from armload.service.reconnecting import Reconnecting
 from armload.service.saved_state import CHANGED, SavedState

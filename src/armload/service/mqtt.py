@@ -11,9 +11,8 @@ from urllib.parse import unquote, urlsplit
 
 from armload.errors import UsageError
 from armload.runtime.extras import install
-from armload.service.receiver import Health, is_host, unreachable, without_user
+from armload.service.receiver import KEPT, Health, is_host, unreachable, without_user
 
-_KEPT = 1000  # messages that wait; then new ones are dropped
 _LONGEST = 60  # [s] between two trials to connect
 _NO_ROOM = 15  # MQTT_ERR_QUEUE_SIZE
 _PORTS = {"mqtt": 1883, "mqtts": 8883}
@@ -46,7 +45,7 @@ class Mqtt:
             raise UsageError(f"MQTT needs paho-mqtt, which is not installed: {install('paho')}") from None
         self._prefix, self.health = parts.path.strip("/") or "armload", Health("the MQTT broker")
         self._client = client = Client(CallbackAPIVersion.VERSION2)
-        client.max_queued_messages_set(_KEPT)
+        client.max_queued_messages_set(KEPT)
         client.reconnect_delay_set(1, _LONGEST)
         client.will_set(f"{self._prefix}/online", "false", qos=1, retain=True)
         if parts.username is not None:
@@ -62,7 +61,7 @@ class Mqtt:
         text = json.dumps(message, allow_nan=False)
         sent = self._client.publish(f"{self._prefix}/{message['arm']}/alarm", text, qos=1)
         if sent.rc == _NO_ROOM:  # without a connection it waits
-            self.health.drop(f"{_KEPT} wait, new ones are dropped")
+            self.health.drop(f"{KEPT} wait, new ones are dropped")
 
     @property
     def dropped(self) -> int:

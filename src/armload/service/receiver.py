@@ -9,6 +9,7 @@ import urllib.error
 
 from armload.errors import one_line
 
+KEPT = 1000  # messages that wait for a receiver: an hour of alarms every four seconds
 _USER = re.compile(r"(?<=//).*@", re.DOTALL)  # of an address: a name, perhaps a password with any character in it
 
 

@@ -18,11 +18,10 @@ from urllib.parse import urlsplit
 from armload.errors import UsageError
 from armload.service.backoff import Backoff
 from armload.service.in_time import InTime
-from armload.service.receiver import Health, is_host, unreachable, without_user
+from armload.service.receiver import KEPT, Health, is_host, unreachable, without_user
 
 _ANSWERED = 5.0  # [s] a receiver may take
 _LONGEST = 60.0  # [s] between two trials
-_KEPT = 1000  # messages that wait; then the oldest give way: an hour of alarms every four seconds
 _WAIT_AT_END = 2.0  # [s] that `close` gives to what still waits
 _ADDRESS = re.compile(r"[!-~]+")  # what a request's first line can hold
 _NAME = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")  # of a header: RFC 9110, 5.6.2
@@ -101,9 +100,9 @@ class Webhook:
     def post(self, message: Mapping[str, Any]) -> None:
         """Take a message to be sent; returns at once."""
         with self._there:
-            if len(self._waiting) >= _KEPT:
+            if len(self._waiting) >= KEPT:
                 self._waiting.popleft()
-                self.health.drop(f"{_KEPT} wait, the oldest are dropped")
+                self.health.drop(f"{KEPT} wait, the oldest are dropped")
             self._waiting.append(json.dumps(message, allow_nan=False).encode())
             self._there.notify()
 
@@ -153,17 +152,14 @@ class Webhook:
         return taken
 
 
-def check_webhook(url: str, headers: Mapping[str, str], called: str = "the webhook") -> None:
+def check_webhook(url: str, headers: Mapping[str, str]) -> None:
     """See that messages can be posted to an address at all: what cannot be sent would be tried for ever.
-
-    Args:
-        called: what the message calls the address.
 
     Raises:
         UsageError: no post can be sent to it, or with these headers.
     """
     shown = without_user(url)
-    said = f"{called} is {shown!r}: expected an address such as https://HOST:PORT/PATH"
+    said = f"the webhook is {shown!r}: expected an address such as https://HOST:PORT/PATH"
     try:
         parts = urlsplit(url)
         port = parts.port
@@ -176,7 +172,7 @@ def check_webhook(url: str, headers: Mapping[str, str], called: str = "the webho
     if not _ADDRESS.fullmatch(url):
         raise UsageError(f"{said}, of ASCII without blanks (a blank is %20)")
     if "@" in parts.netloc:
-        raise UsageError(f"{called} is {shown!r}, with a user in it: give a header Authorization instead")
+        raise UsageError(f"the webhook is {shown!r}, with a user in it: give a header Authorization instead")
     for name, value in headers.items():  # whose value is not shown: it may be a secret
         if not _NAME.fullmatch(name) or name.lower() in _OF_THE_POST:
             raise UsageError(f"the webhook has a header {name!r}: expected a name such as Authorization")

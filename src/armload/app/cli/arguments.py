@@ -120,6 +120,11 @@ def at_least(least: float, kind: type = int, most: float = float("inf")):
     return read
 
 
+def pace(text: str) -> float | None:
+    """Times real time, or max: as fast as possible, which is None."""
+    return None if text == "max" else at_least(0.01, float)(text)
+
+
 def add_arm_arguments(parser: argparse.ArgumentParser, default: str | None = None, required: bool = True) -> None:
     """`--robot`, `--frame` and `--gravity`; with a default, `--robot` is not required."""
     parser.add_argument(

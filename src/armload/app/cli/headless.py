@@ -10,7 +10,7 @@ from typing import Any
 
 from armload.inertia import InertialParameters
 from armload.online import OnlineEstimate
-from armload.service.finite import finite
+from armload.runtime.finite import finite
 from armload.service.session import Session
 
 

@@ -18,6 +18,7 @@ from armload.app.cli.arguments import (
     check_tare_age,
     file_name,
     output_file,
+    pace,
 )
 from armload.app.cli.learning import learn_from
 from armload.app.cli.named import arm_of, payload_named, robot_of
@@ -54,10 +55,6 @@ robot.
 
 
 _UNSAID = object()  # of --speed, for which None is one: as fast as possible
-
-
-def _speed(text: str) -> float | None:
-    return None if text == "max" else at_least(0.01, float)(text)
 
 
 def parser() -> Parser:
@@ -107,7 +104,7 @@ def parser() -> Parser:
     )
     add(
         "--speed",
-        type=_speed,
+        type=pace,
         default=_UNSAID,
         metavar="X|max",
         help="of a log or the simulator (default: 1, real time)",

@@ -16,6 +16,7 @@ from armload.app.cli.arguments import (
     file_name,
     output_file,
     output_folder,
+    pace,
 )
 from armload.app.cli.motion_arguments import box, floor, numbers
 
@@ -158,10 +159,6 @@ def parser() -> Parser:
         metavar="Q1,…",
         help="where it stands [rad] (default: where the motion begins, else near the middle of the joints)",
     )
-    sim("--speed", type=_speed, default=1.0, metavar="X|max", help="of the simulated arm (default: 1, real time)")
+    sim("--speed", type=pace, default=1.0, metavar="X|max", help="of the simulated arm (default: 1, real time)")
     sim("--seed", type=at_least(0), default=0, metavar="N", help="of the sensors' noise (default: 0)")
     return parser
-
-
-def _speed(text: str) -> float | None:
-    return None if text == "max" else at_least(0.01, float)(text)

@@ -94,12 +94,16 @@ def parser() -> Parser:
     )
     add_arm_arguments(random)
     random.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="same seed, same motion (default: 0)")
-    random.add_argument(
-        "--duration", type=at_least(0.1, float, 3600), default=6.0, metavar="S", help="in seconds (default: 6)"
-    )
+    random.add_argument("--duration", type=_duration, default=6.0, metavar="S", help="in seconds (default: 6)")
     random.add_argument("--harmonics", type=at_least(2), default=5, metavar="K", help="(default: 5)")
     random.add_argument("--out", required=True, type=output_file, metavar="FILE", help="JSON file to write")
     return parser
+
+
+def _duration(text: str) -> float:
+    from armload.motion.as_written import LONGEST
+
+    return at_least(0.1, float, LONGEST)(text)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ from armload.app.cli.named import arm_of, motion_of, names_motion, payload_of
 from armload.app.cli.named_logs import check_columns, read_logs
 from armload.app.cli.printing import console, print_json, table, working
 from armload.errors import UsageError
-from armload.service.finite import finite
+from armload.runtime.finite import finite
 
 if TYPE_CHECKING:
     from armload.arms import Arm

@@ -23,6 +23,7 @@ from armload.excitation import Surroundings
 from armload.motion import Motion, check_joints
 
 SPEEDS = {"real time": 1.0, "half": 0.5, "a quarter": 0.25, "a tenth": 0.1}
+_PICTURES = 1 / 30  # [s] between two
 _REST = 0.7  # [s] at the end, before the motion begins again
 _PATH = 200.0  # [Hz] of points on the line that the payload frame draws
 _STEP = 1e-3  # [s] of the slider
@@ -36,7 +37,6 @@ class MotionPage:
         arm: whose motion it is.
         around: floor, boxes and what is held, as they are drawn, with distances; None: a floor at the base.
         host: the interface to listen on. port: if it is taken, the next free one; 0: any.
-        period: between two pictures [s].
 
     Attributes:
         url: where to find the page.
@@ -52,10 +52,9 @@ class MotionPage:
         around: Surroundings | None = None,
         host: str = "127.0.0.1",
         port: int = 8080,
-        period: float = 1 / 30,
     ) -> None:
         check_joints(motion, arm)
-        self._motion, self._arm, self.period = motion, arm, period
+        self._motion, self._arm = motion, arm
         self._around = Surroundings(arm) if around is None else around
         self._page = PageServer(host, port, f"armload · {motion.name}", otherwise="draw it with --figure")
         self._server = server = self._page.viser
@@ -76,7 +75,7 @@ class MotionPage:
             if self._server.get_clients():
                 self.go_on(now - last)
             last = now
-            self._stop.wait(self.period)
+            self._stop.wait(_PICTURES)
 
     def go_on(self, seconds: float) -> None:
         """Show the motion so many seconds later, if it runs: after its end it rests, and begins again."""

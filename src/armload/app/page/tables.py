@@ -198,9 +198,9 @@ def _signed(value: float, digits: int) -> str:
     return text if float(text) else text[1:]
 
 
-def events(log: Iterable[Entry], most: int = 6) -> str:
-    """The last lines of the log, the newest first."""
-    last = list(log)[-most:][::-1]
+def events(log: Iterable[Entry]) -> str:
+    """The last six lines of the log, the newest first."""
+    last = list(log)[:-7:-1]
     if not last:
         return f'<div style="{TEXT};{SOFT}" data-armload="log">nothing has happened yet</div>'
     lines = "".join(

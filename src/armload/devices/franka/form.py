@@ -13,10 +13,8 @@ import json
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from armload.devices.load import Load, counted_numbers
-from armload.errors import SinkError
 from armload.inertia import InertialParameters
 
 
@@ -54,18 +52,11 @@ def set_load_text(load: Load) -> str:
     )
 
 
-def desk_text(load: Load, transformation: ArrayLike | None = None) -> str:
-    """An end effector as JSON, for Desk's settings: the load as the end effector itself.
+def desk_text(load: Load) -> str:
+    """An end effector as JSON, for Desk's settings: a load about the flange as the end effector itself.
 
-    Args:
-        load: about the flange.
-        transformation: pose (4, 4) of the end effector's frame (the tool centre point) in the flange [m]; default: the
-            flange itself. Enter it in Desk afterwards if it is not known here.
+    Its frame, the tool centre point, is the flange: where another one is known, it is entered in Desk.
     """
-    T = np.eye(4) if transformation is None else np.asarray(transformation, dtype=float)
-    R = T[:3, :3] if T.shape == (4, 4) else np.zeros((3, 3))
-    if not (np.allclose(R @ R.T, np.eye(3), atol=1e-6) and np.linalg.det(R) > 0 and np.array_equal(T[3], [0, 0, 0, 1])):
-        raise SinkError("transformation is not a pose: expected 4 rows of 4 numbers, the last one 0 0 0 1")
     mass, com, inertia = franka_load(load.parameters)
-    content = {"mass": mass, "centerOfMass": com, "inertia": inertia, "transformation": T.flatten(order="F").tolist()}
+    content = {"mass": mass, "centerOfMass": com, "inertia": inertia, "transformation": np.eye(4).ravel().tolist()}
     return json.dumps(content) + "\n"

@@ -33,8 +33,8 @@ class Size:
     """How much is measured.
 
     populations: names of `populations.ALL`. methods: names of rows (`rows.default_names`). episodes: of a population.
-    rate: of the logs [Hz]. robot: which arm. times: [s] since a run began. first_seed: of the episodes; each further
-    ten have the next one. per_seed: episodes of a seed; None: the population's own number.
+    rate: of the logs [Hz]. robot: which arm. times: [s] since a run began. per_seed: episodes of a seed; None: the
+    population's own number.
 
     Raises:
         IdentificationError: nothing to measure.
@@ -46,7 +46,6 @@ class Size:
     rate: float = 1000.0
     robot: str = "panda"
     times: tuple[float, ...] = TIMES
-    first_seed: int = FIRST_SEED
     per_seed: int | None = None
 
     def __post_init__(self) -> None:
@@ -63,7 +62,7 @@ class Size:
         each = of.per_seed if self.per_seed is None else self.per_seed
         total = min(self.episodes, _REPEATED * each) if of.name == REPEAT else self.episodes
         counts = [min(each, total - first) for first in range(0, total, each)]
-        return [(self.first_seed + k, count) for k, count in enumerate(counts)]
+        return [(FIRST_SEED + k, count) for k, count in enumerate(counts)]
 
 
 QUICK = Size(
@@ -90,7 +89,7 @@ def keys(size: Size, robot: Arm, rows: dict[str, list[Row]]) -> dict[str, str]:
     for name, members in rows.items():
         of = population(name)
         seeds = size.seeds(of)
-        looks, prior = of.fingerprint(robot, size.first_seed), prior_of(of.recipe, robot)
+        looks, prior = of.fingerprint(robot, FIRST_SEED), prior_of(of.recipe, robot)
         for row in members:
             # what the baselines answer depends on the population's prior, what the others do does not
             probe = (row, "" if row.method else key_of(prior.mean.tolist(), prior.covariance.tolist()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ from armload.simulation import Gains, Resolution, Run, Sensors, World, simulate_
 from armload.simulation.resolution import COARSE
 
 _TARE_NOISE = 1 << 30  # the tare's sensor noise is another than the run's
-_BATCH = 8  # episodes a process simulates at a time: what memory holds, and how often progress is reported
+_BATCH = 8  # episodes a process simulates at a time: what memory holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +77,6 @@ def simulate_episodes(
     rate: float | None = None,
     workers: int = 1,
     resolution: Resolution = COARSE,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Iterator[EpisodeLogs]:
     """The logs of each episode, in their order, a few at a time so that memory stays bounded.
 
@@ -85,7 +84,6 @@ def simulate_episodes(
         rate: of all logs [Hz]; None: each episode's own.
         workers: processes; the logs do not depend on it.
         resolution: how finely the engine works.
-        progress: called as progress(done, total) after every episode handed out.
 
     Raises:
         ArmError: fewer than one worker, or a payload the arm cannot hold.
@@ -93,13 +91,8 @@ def simulate_episodes(
     if workers < 1:
         raise ArmError(f"{workers} workers asked for: expected at least 1")
     batches = [episodes[k : k + _BATCH] for k in range(0, len(episodes), _BATCH)]
-    done = 0
     for logs in _batches(batches, rate, workers, resolution):
-        for entry in logs:
-            done += 1
-            if progress is not None:
-                progress(done, len(episodes))
-            yield entry
+        yield from logs
 
 
 def _batches(

@@ -13,14 +13,13 @@ from armload.errors import MotionError
 from armload.inertia import InertialParameters
 from armload.motion import FourierMotion, Motion, check_motion, rated_load
 from armload.motion.blended import BlendedMotion
-from armload.motion.collision import POSE_FLOOR, POSE_SELF, CapsuleArm, capsule_arm
+from armload.motion.collision import KEPT_FLOOR, KEPT_SELF, POSE_FLOOR, POSE_SELF, CapsuleArm, capsule_arm
 from armload.motion.point_to_point import PointToPoint
 from armload.motion.random_fourier import clear_poses, filled_limits
 
 _POSES = 512  # poses tried for the list of clear ones
 _TRIALS = 40  # motions tried until one may be run
 _FACTORS = 0.8 ** np.arange(7)  # by which all amplitudes are reduced until nothing touches
-_FLOOR, _SELF = 0.05, 0.01  # [m] clearances kept
 BLEND = 0.5  # [s]
 KINDS = ("reference", "long", "slow", "fast", "harmonics", "point-to-point", "pick-and-place", "partial")
 
@@ -177,7 +176,7 @@ class MotionSource:
         """Whether the arm may run the motion with its rated payload, with some clearance."""
         ticks = np.linspace(0.0, motion.duration, max(50, round(12 * motion.duration)))
         clear = self.model.clearance(motion(ticks)[0], self.floor)
-        if clear.floor.min() < _FLOOR or clear.self.min() < _SELF:
+        if clear.floor.min() < KEPT_FLOOR or clear.self.min() < KEPT_SELF:
             return False
         return check_motion(self.arm, motion, self.load, floor=self.floor, rate=100.0, collision_rate=25.0).ok
 

@@ -9,9 +9,7 @@ from armload.lab.report.html import Section
 from armload.lab.report.shown import Table
 
 
-def answer_section(
-    result: Identification, truth: InertialParameters | None = None, title: str = "What was found"
-) -> Section:
+def answer_section(result: Identification, truth: InertialParameters | None = None) -> Section:
     """Mass, centre of mass and the inertia about it with their 95 % intervals, what it rests on, and the notes.
 
     Args:
@@ -37,4 +35,4 @@ def answer_section(
     text = f"{result.robot} holds {holding}, about {result.frame}, relative to the {result.relative_to}."
     if result.notes:
         text += "\n\n" + "\n\n".join(note[:1].upper() + note[1:] + "." for note in result.notes)
-    return Section(title, text, (Table("The answer", columns, tuple(rows), rests_on(result)),))
+    return Section("What was found", text, (Table("The answer", columns, tuple(rows), rests_on(result)),))

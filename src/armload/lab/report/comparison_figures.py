@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from armload.lab.evaluation import Comparison
 
 
-def error_bars(comparison: Comparison, at: int = -1) -> Figure:
-    """Mean absolute error of every method and parameter at times[at], as in Fig. 4-7 of Taie et al. 2024."""
+def error_bars(comparison: Comparison) -> Figure:
+    """Mean absolute error of every method and parameter at the last time, as in Fig. 4-7 of Taie et al. 2024."""
     styles = {
         name: {"color": style["color"], "edgecolor": "white", "linewidth": 0.0}
         | ({"hatch": "////"} if name in comparison.baselines else {})
         for name, style in method_styles(comparison).items()
     }
-    spread = [None] * len(styles) if len(comparison.labels) == 1 else comparison.spread[:, at]
+    spread = [None] * len(styles) if len(comparison.labels) == 1 else comparison.spread[:, -1]
     return bars_of_errors(
-        dict(zip(comparison.methods, zip(comparison.mae[:, at], spread, strict=True), strict=True)), styles
+        dict(zip(comparison.methods, zip(comparison.mae[:, -1], spread, strict=True), strict=True)), styles
     )
 
 

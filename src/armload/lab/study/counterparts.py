@@ -76,16 +76,15 @@ def real_rows(cells: Cells) -> list[Row]:
     return rows
 
 
-def benchmark_rows(cells: Cells, reduced: bool = False) -> list[Row]:
-    """Fig. 7: ensembles and least squares, the test payload on real-like arms; reduced: what a figure has room for."""
+def benchmark_rows(cells: Cells) -> list[Row]:
+    """Fig. 7: ensembles and least squares, the test payload on real-like arms."""
     rows: list[Row] = []
     for kind, scale in SHOWN_ENSEMBLES:
         found = both_stages(cells, kind, "row", REAL, scale)
         rows.append((_shown(kind, scale, found), found and found.errors))
     rows += [(name, at_end(benchmark(cells, m), REAL)) for m, name in LEAST_SQUARES.items()]
     rows.append((TRAINING_MEAN, at_end(benchmark(cells, "training-mean", "row"), REAL)))
-    left_out = (ensemble_shown("tree", "standard"), LEAST_SQUARES["rls-filter-calibrated-other"])
-    return [row for row in rows if not (reduced and row[0] in left_out)]
+    return rows
 
 
 def ratio_table(cells: Cells) -> Table:

@@ -41,7 +41,7 @@ def plan(size: Size) -> list[Spec]:
     cells += _ablations(tree, network)
     # the paper does not say how it scaled: the headline once more, standardised
     cells += _main(Spec("network", scale="standard", ablation="scale"), SEEDS[:1], "ideal")
-    shrunk = [_shrunk(cell, size) for cell in cells]
+    shrunk = [as_small(cell, size) for cell in cells]
     return list({cell.name: cell for cell in reversed(shrunk)}.values())[::-1]  # the first of a name stays
 
 
@@ -69,7 +69,8 @@ def _ablations(tree: Spec, network: Spec) -> list[Spec]:
     return out
 
 
-def _shrunk(spec: Spec, size: Size) -> Spec:
+def as_small(spec: Spec, size: Size) -> Spec:
+    """A cell with no more epochs, members and hidden neurons than a size has; at full size as it is."""
     if size.max_epochs is None or spec.kind == "benchmark":
         return spec
     small = replace(spec, max_epochs=min(spec.max_epochs, size.max_epochs))

@@ -14,6 +14,7 @@ from armload.lab.evaluation import EvaluationRun
 from armload.lab.experiment import Task, listed
 from armload.lab.study.basis import Basis, Size, basis_of_process
 from armload.lab.study.numbers import READING
+from armload.lab.study.plan import as_small
 from armload.lab.study.protocols import measure_learned
 from armload.lab.study.spec import Spec
 from armload.lab.study.trained import train
@@ -34,14 +35,8 @@ def reading_specs(size: Size) -> list[Spec]:
         for split in splits
         for stages in (1, 2)
     ]
-    shrunk = [spec if size.max_epochs is None else _shrunk(spec, size) for spec in specs]
-    once = list({spec.name: spec for spec in shrunk}.values())
+    once = list({spec.name: spec for spec in (as_small(spec, size) for spec in specs)}.values())
     return once if size.max_epochs is None else [spec for spec in once if spec.scale == "raw"]
-
-
-def _shrunk(spec: Spec, size: Size) -> Spec:
-    small = replace(spec, members=min(spec.members, size.members or 5), hidden=min(spec.hidden, size.hidden or 500))
-    return replace(small, max_epochs=min(spec.max_epochs, size.max_epochs or spec.max_epochs))
 
 
 def basis_of_readings(basis: Basis) -> Basis:

@@ -46,9 +46,9 @@ class Rule(NamedTuple):
     criterion: str
 
 
-def izz(cell: Cell, protocol: str = REAL) -> dict[str, NDArray[np.float64]] | None:
+def izz(cell: Cell) -> dict[str, NDArray[np.float64]] | None:
     """Izz of one run over time: t, single, running (T,), and their signed errors `single_error`, `running_error`."""
-    curve = cell.get("izz", {}).get(protocol)
+    curve = cell.get("izz", {}).get(REAL)
     if not curve:
         return None
     out = {name: np.array(curve[name], dtype=float) for name in ("t", "single", "running", "truth")}

@@ -32,11 +32,11 @@ def ratio_elsewhere(errors: NDArray[np.float64], blind: NDArray[np.float64]) -> 
     return mean_ratio(errors.mean(axis=0)[rest], blind.mean(axis=0)[rest])
 
 
-def first_elsewhere(cells: Cells, kind: str, split: str = "row") -> tuple[list[str], float, float] | None:
+def first_elsewhere(cells: Cells, kind: str) -> tuple[list[str], float, float] | None:
     """Of an ensemble's first estimate on real-like arms: the parameters that the training mean hits by chance, the
     ratio of the errors on the others, and the ratio on Izz. None: a cell is missing, or there is no such parameter."""
-    own = both_stages(cells, kind, split, REAL, read=at_first)
-    blind = at_first(benchmark(cells, "training-mean", split), REAL)
+    own = both_stages(cells, kind, "row", REAL, read=at_first)
+    blind = at_first(benchmark(cells, "training-mean", "row"), REAL)
     if own is None or blind is None or not by_chance(blind).any():
         return None
     at = NAMES.index("Izz")

@@ -14,11 +14,11 @@ from armload.lab.study.statements import RULES
 _LEARNED = ("tree", "network", "mixed")
 
 
-def by_training(cells: Cells, claim: Mapping[str, Any], split: str = "row") -> list[float]:
+def by_training(cells: Cells, claim: Mapping[str, Any]) -> list[float]:
     """The number of a statement by each seed, all networks with the cap of those that have several seeds.
 
     Args:
-        cells: finished cells by name. claim: of `load_claims`. split: what was held out.
+        cells: finished cells by name. claim: of `load_claims`.
 
     Returns:
         One number for each seed with all its cells; empty where there are fewer than two, or no training matters.
@@ -35,7 +35,7 @@ def by_training(cells: Cells, claim: Mapping[str, Any], split: str = "row") -> l
             if cell["spec"]["kind"] not in _LEARNED
             or (_main(cell) and cell["spec"]["seed"] == seed and cap(cell) in (None, most))
         }
-        if (measured := RULES[claim["rule"]].measure(kept, claim.get("learner"), split)) is not None:
+        if (measured := RULES[claim["rule"]].measure(kept, claim.get("learner"), "row")) is not None:
             found.append(measured.value)
     return found if len(set(found)) > 1 else []
 

@@ -27,7 +27,7 @@ WIDE = 0.15
 LIGHT = 0.1  # of the others, the same of light ones of every kind; a stated prior, twice that of the lightest
 _LIGHTER = (0.03, 0.3)  # of what the arm is rated for: the other `light` family has less, all families have more
 _KINDS = ("boxes", "shapes", "tools", "container")
-_DRAWS = 1500  # payloads of each kind
+DRAWS = 1500  # payloads of each kind or family that a prior is fitted on
 
 
 def with_added(prior: MixturePrior, arm: Arm, seed: int = 0) -> MixturePrior:
@@ -39,9 +39,9 @@ def with_added(prior: MixturePrior, arm: Arm, seed: int = 0) -> MixturePrior:
         return np.array([draw_payload(family, int(s), m).parameters.phi for s, m in zip(seeds, ratings, strict=True)])
 
     def evenly(low: float, high: float) -> NDArray[np.float64]:
-        return rated * np.exp(rng.uniform(np.log(low), np.log(high), size=_DRAWS))
+        return rated * np.exp(rng.uniform(np.log(low), np.log(high), size=DRAWS))
 
-    lighter = rng.random(_DRAWS) < POPULATIONS["broad"].lighter
+    lighter = rng.random(DRAWS) < POPULATIONS["broad"].lighter
     wide = drawn("wide", np.where(lighter, evenly(LIGHTEST, 1.0), rated))
     light = np.concatenate([drawn(kind, evenly(*_LIGHTER)) for kind in _KINDS])
     prior = prior.joined(MixturePrior.fit({"light": light}, {"light": 1.0}, seed), LIGHT)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armload.ensembles.weak_learner import Learner
 from armload.inertia import NAMES, Z95
-from armload.lab.training.calibrating import TREES, fit_calibration, nearest
+from armload.lab.training.calibrating import fit_calibration, nearest
 from armload.lab.training.records import TIMES, Records
 from armload.posterior import Calibration, MixturePrior
 from armload.posterior.evidence import KINDS
@@ -53,9 +51,7 @@ def _plain(value: Any) -> Any:
     return round(value, 4) if value == value else None
 
 
-def cross_validated(
-    records: Records, prior: MixturePrior, seed: int = 0, learners: Sequence[Learner] = TREES
-) -> Coverage:
+def cross_validated(records: Records, prior: MixturePrior, seed: int = 0) -> Coverage:
     """Coverage of the intervals on held-out episodes: each fold is answered by a calibration fitted on the others.
 
     The folds together lie near 95 % whatever the luck of the draw: where one holds more of the wild episodes, the
@@ -65,7 +61,7 @@ def cross_validated(
     error, half = np.zeros((2, len(records), 10))
     for k in range(FOLDS):
         held = np.isin(records.episode, episodes[k::FOLDS])
-        calibration = fit_calibration(records.select(~held), prior, learners=learners, seed=seed + k)
+        calibration = fit_calibration(records.select(~held), prior, seed=seed + k)
         error[held], half[held] = _answered(records.select(held), prior, calibration)
     return _coverage(records, error, half)
 

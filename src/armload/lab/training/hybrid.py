@@ -15,7 +15,7 @@ from armload.errors import ModelError
 from armload.lab.cells import key_of
 from armload.lab.engine import Engine
 from armload.lab.episodes import LIGHTEST, POPULATIONS, TOOL_SHARE, Episode, draw_episodes
-from armload.lab.training.added_families import with_added
+from armload.lab.training.added_families import DRAWS, with_added
 from armload.lab.training.calibrating import fit_calibration
 from armload.lab.training.coverage import FOLDS, Coverage, cross_validated
 from armload.lab.training.records import TIMES, Records, measure_episodes
@@ -29,7 +29,6 @@ EPISODES = 2400
 CHUNK = 300  # episodes that are kept together: what an interruption can lose
 _MOTIONS = 120  # of a chunk
 _FIRST_SEED = 11  # of the first chunk; other seeds of a training begin far from it
-_DRAWS = 1500  # payloads of each family
 # how often a family is expected; nothing at all is one, and without `light` a screw or a phone is taken for it
 FAMILIES = {
     "boxes": 0.2,
@@ -109,11 +108,11 @@ def payload_mixture(arm: Arm, seed: int = 0) -> MixturePrior:
         seeds = rng.integers(1 << 30, size=count)
         return np.array([draw_payload(family, int(s), m).parameters.phi for s, m in zip(seeds, sizes, strict=True)])
 
-    samples = {f: drawn(f, _DRAWS, rated) for f in ("boxes", "shapes", "tools", "container", "light")}
+    samples = {f: drawn(f, DRAWS, rated) for f in ("boxes", "shapes", "tools", "container", "light")}
     samples["nothing"] = np.zeros((20, 10))
-    tools = drawn("tools", _DRAWS, TOOL_SHARE * rated)
+    tools = drawn("tools", DRAWS, TOOL_SHARE * rated)
     others = np.concatenate([samples["boxes"], samples["shapes"]])
-    samples["tool and payload"] = tools + (1.0 - TOOL_SHARE) * others[rng.permutation(len(others))[:_DRAWS]]
+    samples["tool and payload"] = tools + (1.0 - TOOL_SHARE) * others[rng.permutation(len(others))[:DRAWS]]
     fitted = MixturePrior.fit(samples, FAMILIES, seed)
     wide = np.diag((_ANYTHING * payload_prior_std(arm)) ** 2)
     fitted = fitted.joined(MixturePrior(np.ones(1), np.zeros((1, 10)), wide[None], ("anything",)), _ANYTHING_SHARE)
