@@ -1,12 +1,14 @@
 """Ensembles: one list of checks over every implementation, then what each kind promises of its own."""
 
+import signal
+
 import numpy as np
 import pytest
 from sklearn.base import clone
 from sklearn.tree import DecisionTreeRegressor
 from sklearn.utils.estimator_checks import check_estimator, estimator_checks_generator
 
-from armload.ensembles import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage
+from armload.ensembles import BaggingEnsemble, MixedEnsemble, NetworkLearner, TreeLearner, TwoStage, network
 from armload.ensembles.checkpoint import Weights
 from armload.ensembles.compiled import CompiledNetworks
 from armload.ensembles.network import _fold, plateaued
@@ -408,6 +410,29 @@ def test_an_interrupted_training_goes_on_exactly(tmp_path, stop_after):
     assert epochs == list(range(stop_after + 1, max(whole.epochs_) + 1))
     np.testing.assert_array_equal(resumed.compiled_.members(Xv), whole.compiled_.members(Xv))
     np.testing.assert_array_equal(resumed.losses_, whole.losses_)
+
+
+def test_an_interruption_within_an_epoch_is_heard_once_that_is_whole_and_kept(tmp_path, monkeypatch):
+    """Compiled code that still runs when Python ends takes the process with it."""
+    X, y = rows(0, 60)
+    epoch, loss = network._functions()
+
+    def interrupted(*given):
+        signal.raise_signal(signal.SIGINT)
+        return epoch(*given)
+
+    monkeypatch.setattr(network, "_functions", lambda: (interrupted, loss))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    path, ensemble = tmp_path / "training.npz", BaggingEnsemble(SMALL, members=2)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            ensemble.fit(X, y, checkpoint=path)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    monkeypatch.undo()
+    epochs = []
+    ensemble.fit(X, y, checkpoint=path, progress=lambda s: epochs.append(s.done))
+    assert epochs[0] == 2
 
 
 def test_a_checkpoint_of_other_data_or_settings_is_refused(tmp_path):

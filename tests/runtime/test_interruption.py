@@ -4,7 +4,7 @@ import signal
 
 import pytest
 
-from armload.runtime.interruption import held_back
+from armload.runtime.interruption import held_back, put_off
 
 
 @pytest.fixture(autouse=True)
@@ -51,3 +51,26 @@ def test_whoever_stops_what_a_shell_runs_in_the_background_is_heard(number):
         assert signal.getsignal(number) == signal.SIG_IGN
     finally:
         signal.signal(number, before)
+
+
+def test_an_interruption_of_what_must_be_whole_reaches_its_own_handler_once_that_is_done():
+    said = []
+    before = signal.signal(signal.SIGTERM, lambda *_: said.append("its handler"))
+    try:
+        with put_off():
+            signal.raise_signal(signal.SIGTERM)
+            said.append("whole")
+        assert said == ["whole", "its handler"]
+        with pytest.raises(KeyboardInterrupt), put_off():
+            said.append(signal.raise_signal(signal.SIGINT))
+        assert said[-1] is None  # it was not broken off
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_an_interruption_that_is_ignored_stays_so_while_something_must_be_whole():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with put_off():
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN

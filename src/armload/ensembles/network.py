@@ -21,6 +21,7 @@ from armload.ensembles.compiled import CompiledNetworks
 from armload.ensembles.progress import Progress, Report
 from armload.ensembles.weak_learner import INITIAL_WEIGHTS, SHUFFLE, Bag, Fitted, Learner, Scaling
 from armload.errors import ModelError
+from armload.runtime.interruption import put_off
 
 _CHUNK = 2000  # validation rows evaluated at once: bounds the memory of the hidden layers
 _SAVE_EVERY = 10.0  # [s] between checkpoints
@@ -83,9 +84,10 @@ class NetworkLearner(Learner):
             while len(state.active) and state.epoch < self.max_epochs:
                 rows, weight = self._batches(data, state, bag.seed)
                 rate = np.float32(self.learning_rate)
-                training = epoch_function(state.training, data.X, data.y, rows, weight, rate)
-                parts = loss_function(training[0], *data.validation(state.active))
-                state = self._after_epoch(state, training, np.asarray(parts, dtype=float).sum(axis=0))
+                with put_off():
+                    training = epoch_function(state.training, data.X, data.y, rows, weight, rate)
+                    parts = np.asarray(loss_function(training[0], *data.validation(state.active)), dtype=float)
+                    state = self._after_epoch(state, training, parts.sum(axis=0))
                 best = np.nanmin(state.losses[-1]) if np.isfinite(state.losses[-1]).any() else np.nan
                 note = f"{len(state.active)} of {len(state.epochs)} still training, validation loss {best:.3g}"
                 report(Progress("networks", state.epoch, self.max_epochs, note))

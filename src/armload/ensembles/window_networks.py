@@ -24,6 +24,7 @@ from sklearn.base import BaseEstimator
 from armload.ensembles.adam import AdamState, adam_step
 from armload.ensembles.weak_learner import BOOTSTRAP, HOLD_OUT, INITIAL_WEIGHTS, SHUFFLE
 from armload.errors import ModelError
+from armload.runtime.interruption import put_off
 
 ARCHITECTURES = ("conv", "gru", "transformer")
 _HEADS, _BLOCKS = 4, 2  # of the transformer
@@ -96,8 +97,9 @@ class WindowNetworks(BaseEstimator):
         best, least, losses = weights, np.full(self.members, np.inf), []
         batches = np.stack([self._batches(kept, m) for m in range(self.members)], axis=1)  # (steps, M, batch)
         for part in np.array_split(np.arange(self.steps), min(_CHECKS, self.steps)):
-            state = steps_function(state, windows, outputs, batches[part], self._rates(part))
-            found = np.asarray(loss_function(state.weights, windows[held], outputs[held]), dtype=float)
+            with put_off():
+                state = steps_function(state, windows, outputs, batches[part], self._rates(part))
+                found = np.asarray(loss_function(state.weights, windows[held], outputs[held]), dtype=float)
             losses.append(found)
             better = found < least
             least = np.where(better, found, least)

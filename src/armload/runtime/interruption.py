@@ -1,5 +1,5 @@
-"""Ctrl-C held back, while an arm moves or modules load that would swallow it, or from processes that are ended by the
-one that began them; other signals that end as it does."""
+"""Ctrl-C held back: while an arm moves, compiled code runs, or modules load that would swallow it, and from processes
+that are ended by the one that began them; other signals that end as it does."""
 
 from __future__ import annotations
 
@@ -47,6 +47,30 @@ def held_back() -> Iterator[Interruption]:
             signal.signal(number, handler)
         if interruption.name is not None:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def put_off() -> Iterator[None]:
+    """Within, what would interrupt is only noted; who handles it hears of it at the end.
+
+    For compiled code with threads of its own: a Python that ends while they work ends by SIGSEGV. A signal that is
+    ignored stays so, and one that ends the process at once does. In another thread than the main one nothing is
+    changed.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard: list[int] = []
+    handlers = {number: handler for number in _SIGNALS if callable(handler := signal.getsignal(number))}
+    for number in handlers:
+        signal.signal(number, lambda heard_now, _: heard.append(heard_now))
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in heard:
+            handlers[signal.Signals(number)](number, None)
 
 
 @contextmanager
