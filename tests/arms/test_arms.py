@@ -1028,3 +1028,30 @@ def scaled(text, factor):
     )
     assert lines != text
     return lines
+
+
+@pytest.mark.parametrize(
+    ("joint", "q", "dq", "allowed"),
+    [  # by the formulas of libfranka's rate_limiting.h, joint by joint
+        (0, 2.5, 1.0, -0.30 + np.sqrt(12.0 * (2.75010 - 2.5))),
+        (0, 2.5, -1.0, 2.62),
+        (1, -1.6, -1.0, -0.20 + np.sqrt(5.17 * (1.791800 - 1.6))),
+        (2, -2.6, -1.0, -0.20 + np.sqrt(7.00 * (2.906500 - 2.6))),
+        (3, -0.4, 1.0, -0.30 + np.sqrt(8.00 * (-0.1458 + 0.4))),
+        (3, -2.9, -1.0, -0.30 + np.sqrt(8.00 * (3.048100 - 2.9))),
+        (4, 2.6, 1.0, -0.35 + np.sqrt(34.0 * (2.81010 - 2.6))),
+        (5, 0.7, -1.0, -0.35 + np.sqrt(11.0 * (-0.54092 + 0.7))),
+        (5, 2.5, 1.0, 4.18),
+        (6, 3.02, 1.0, 0.0),
+    ],
+)
+def test_an_fr3_may_go_slower_towards_the_ends_of_its_ranges_as_its_maker_says(joint, q, dq, allowed):
+    place, speed = np.zeros((1, 7)), np.zeros((1, 7))
+    place[0, joint], speed[0, joint] = q, dq
+    assert arm("fr3").limits.velocity_at(place, speed)[0, joint] == pytest.approx(allowed, abs=1e-12)
+
+
+@pytest.mark.parametrize("rows", [((1.0,) * 7,) * 3, ((0.0,) * 7,) * 4, ((1.0,) * 6,) * 4])
+def test_ends_of_velocity_limits_that_are_none_are_refused(panda, rows):
+    with pytest.raises(ArmError, match="ends of the velocity limits"):
+        replace(panda, velocity_ends=rows)

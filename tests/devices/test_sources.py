@@ -761,6 +761,7 @@ def test_a_bug_in_the_reader_still_says_where_it_is(client, capfd):
 def test_an_arm_goes_to_another_process_as_it_is(every_arm):
     content = json.loads(json.dumps(arm_to_json(every_arm)))
     assert arm_from_json(content).fingerprint == every_arm.fingerprint
+    assert arm_from_json(content).velocity_ends == every_arm.velocity_ends
 
 
 def test_an_arm_with_a_tool_other_links_and_a_tilted_base_too(panda):

@@ -143,6 +143,21 @@ def test_a_clearance_a_millimetre_short_does_not_cost_most_of_the_motion():
     assert np.abs(accelerations / limits.most["acceleration"]).max() > 0.8
 
 
+def test_a_design_goes_slower_near_the_ends_of_the_joints_ranges_where_its_arm_must():
+    fr3 = arm("fr3")
+    start = np.array([0.0, -1.2, 0.0, -2.8, 0.0, 3.9, 2.3])
+    limits = Constraints(fr3, start, share=1.0)
+    motion = design_motion(limits, Criterion(fr3), 1.5, starts=2).motion
+    assert problems(limits, motion) == []
+    q, dq, _ = motion(motion.instants(1000.0))
+    # of joint 4 towards its low end, by the formula of libfranka's rate_limiting.h
+    allowed = np.minimum(2.62, np.sqrt(8.0 * (q[:, 3] + 3.0481)) - 0.3)
+    assert np.all(-dq[:, 3] < allowed)
+    careless = Constraints(replace(fr3, velocity_ends=None), start, share=1.0)
+    passed = problems(limits, design_motion(careless, Criterion(careless.arm), 1.5, starts=2).motion)
+    assert any("velocity" in one for one in passed)
+
+
 def test_the_arms_own_check_agrees_with_a_design(panda, designed):
     assert check_motion(panda, designed.motion, PayloadRange(1.5).payload(1.0, np.zeros(3))).ok
 

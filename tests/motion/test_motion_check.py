@@ -1,6 +1,7 @@
 """Capsules against brute force, poses against Pinocchio, and checks against motions made to break one thing."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -300,3 +301,19 @@ def test_a_panda_that_hangs_from_the_root_has_no_floor_at_the_root():
     hanging = check_motion(mounted("panda", "0 0 0", "3.14159265358979 0 0"), taie2024())
     assert hanging.floor_clearance == np.inf
     assert hanging.ok, hanging.problems
+
+
+def test_a_motion_too_fast_for_where_it_is_is_refused_by_the_place():
+    fr3 = arm("fr3")
+    elsewhere = replace(fr3, velocity_ends=None)
+    motion = random_motion(elsewhere, seed=11)
+    assert check_motion(elsewhere, motion, rated_load(fr3)).ok
+    found = check_motion(fr3, motion, rated_load(fr3))
+    assert len(found.problems) == 1
+    said = re.fullmatch(
+        r"fr3_joint\d passes its velocity limit of ([\d.]+) rad/s at -?[\d.]+ rad, near the end of its range, "
+        r"with ([\d.]+) rad/s at t = [\d.]+ s",
+        found.problems[0],
+    )
+    assert float(said[1]) < float(said[2]) < 2.62
+    assert check_motion(fr3, random_motion(fr3, seed=11), rated_load(fr3)).ok

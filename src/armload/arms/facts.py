@@ -55,6 +55,11 @@ class ArmFacts:
     link_spread: float = _fact("links", "spread")  # see `Arm`
     acceleration: tuple[float, ...] | None = _fact("limits", "acceleration [rad/s²]", None)
     jerk: tuple[float, ...] | None = _fact("limits", "jerk [rad/s³]", None)
+    # less velocity near the ends of the range, at most √(slope·(end − q)) − reserve: all four or none
+    end_low: tuple[float, ...] | None = _fact("limits", "end_low [rad]", None)
+    end_high: tuple[float, ...] | None = _fact("limits", "end_high [rad]", None)
+    end_slope: tuple[float, ...] | None = _fact("limits", "end_slope [rad/s²]", None)
+    end_reserve: tuple[float, ...] | None = _fact("limits", "end_reserve [rad/s]", None)
     position_stiffness: tuple[float, ...] | None = _fact("control", "position_stiffness [N·m/rad]", None)
     impedance_stiffness: tuple[float, ...] | None = _fact("control", "impedance_stiffness [N·m/rad]", None)
     offset: tuple[float, ...] | None = _fact("mismatch", "offset [N·m]", None)
@@ -92,10 +97,12 @@ class ArmFacts:
     @property
     def of_arm(self) -> dict[str, Any]:
         """The fields of `Arm` that the sheet fills."""
+        ends = self.end_low, self.end_high, self.end_slope, self.end_reserve
         return {
             "rated_payload": self.rated_payload,
             "acceleration": self.acceleration,
             "jerk": self.jerk,
+            "velocity_ends": None if None in ends else ends,
             "link_spread": self.link_spread,
             "torque_gain_std": self.gain_std,
             "motor_torque": self.torque_side == "motor",

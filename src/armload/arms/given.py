@@ -52,6 +52,22 @@ def check_number(value: float | None, what: str, zero: bool) -> None:
         raise ArmError(f"{what} is {value!r}: expected a finite number {'of 0 or more' if zero else 'above 0'}")
 
 
+def check_ends(values: ArrayLike | None, joints: int) -> None:
+    """See that the rows of `limits.VelocityEnds` are four, each with a finite number for each joint. None: not known.
+
+    Raises:
+        ArmError: they are not, or a slope is not above zero.
+    """
+    if values is None:
+        return
+    rows = own_reals(values, "the ends of the velocity limits", ArmError)
+    if rows.ndim != 2 or len(rows) != 4 or rows.shape[1] < joints or not np.isfinite(rows).all() or rows[2].min() <= 0:
+        raise ArmError(
+            f"the ends of the velocity limits are {values!r}: expected low and high ends, slopes above 0 and reserves, "
+            f"each for {joints} joints"
+        )
+
+
 def check_limits(values: ArrayLike | None, what: str, joints: int) -> None:
     """See that there is a limit above zero for each joint, and maybe for more. None is for what is not known.
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from armload.arms.description import read_chain
-from armload.arms.given import check_limits, check_number, gravity_of
+from armload.arms.given import check_ends, check_limits, check_number, gravity_of
 from armload.arms.limits import Limits
 from armload.arms.rigid_body import Body, BodyMotion, body_motions, built, carrier_pose, placement_of
 from armload.errors import ArmError
@@ -48,6 +48,7 @@ class Arm:
             the URDF's.
         rated_payload: the maker's rated payload [kg], if known.
         acceleration, jerk: limits (n,) that a URDF cannot hold; those of joints beyond `frame` are passed over.
+        velocity_ends: of an arm that is to be slower near the ends of its range the four rows of `VelocityEnds`.
         link_spread: how far the description's link parameters may be off, in units of 2 % of mass, 2 mm of CoM and 5 %
             of inertia (1 sigma): 1 for an identified model, 10 for nominal figures of unknown quality.
         motor_torque: whether the torque is known to be motor current times a constant, with all of the gear's friction
@@ -69,6 +70,7 @@ class Arm:
     rated_payload: float | None = field(default=None, repr=False)
     acceleration: tuple[float, ...] | None = field(default=None, repr=False)
     jerk: tuple[float, ...] | None = field(default=None, repr=False)
+    velocity_ends: tuple[tuple[float, ...], ...] | None = field(default=None, repr=False)
     link_spread: float = field(default=10.0, repr=False)
     motor_torque: bool = field(default=False, repr=False)
     gear_loss: float = field(default=0.0, repr=False)
@@ -94,6 +96,7 @@ class Arm:
             object.__setattr__(self, "attached_error", None)
         check_limits(self.acceleration, "the acceleration limit", self.n)
         check_limits(self.jerk, "the jerk limit", self.n)
+        check_ends(self.velocity_ends, self.n)
         _ = self._model  # fail now, not at the first sample
 
     def __getstate__(self) -> dict[str, Any]:
@@ -144,8 +147,8 @@ class Arm:
 
     @cached_property
     def limits(self) -> Limits:
-        """Joint limits, from the URDF and, for acceleration and jerk, from the arm's sheet."""
-        return Limits.of(self._model, self.acceleration, self.jerk)
+        """Joint limits, from the URDF and, for what that cannot hold, from the arm's sheet."""
+        return Limits.of(self._model, self.acceleration, self.jerk, self.velocity_ends)
 
     @property
     def link_parameters(self) -> NDArray[np.float64]:

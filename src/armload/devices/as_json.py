@@ -32,6 +32,8 @@ def arm_from_json(facts: dict[str, Any]) -> Arm:
         facts["links"] = np.array(facts["links"])
     for name in ("gravity", "acceleration", "jerk"):
         facts[name] = None if facts[name] is None else tuple(facts[name])
+    if facts["velocity_ends"] is not None:
+        facts["velocity_ends"] = tuple(map(tuple, facts["velocity_ends"]))
     return Arm(**facts)
 
 

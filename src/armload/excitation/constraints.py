@@ -107,6 +107,10 @@ class Constraints:
             "torque": self.share * self.arm.limits.effort,
         }
 
+    def fastest(self, q: NDArray[np.float64], dq: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The largest speed (N, n) at positions q (N, n) in the sense of velocities dq (N, n): less near the ends."""
+        return self.share * filled_limits(self.arm.limits).velocity_at(q, dq)
+
     def whose(self, what: str) -> list[str]:
         """Of each joint, what a limit is a share of, in words: its own limit, or one that is assumed."""
         if what not in _MAY_BE_ASSUMED:

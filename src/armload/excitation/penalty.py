@@ -22,7 +22,8 @@ from armload.excitation.rows import MotionRows, RowAdjoint
 _TIGHT = 0.985
 _NEAR = 0.05  # [m] beyond a clearance counts like a limit passed by its own size
 _ROOM = 0.1  # [rad] about which a position counts so
-_STEP = 1e-5  # [rad] of the difference quotients of clearances
+_STEP = 1e-5  # [rad] of the difference quotients of clearances, and of what velocity is left near the ends of a range
+_LEFT = 0.05  # of the velocity limit that counts as left at the ends of a range
 _EVERY = 2  # of the samples are looked at for clearances
 
 
@@ -67,15 +68,33 @@ class Penalty:
         over = np.maximum(rows.q - self._high, 0.0) - np.maximum(self._low - rows.q, 0.0)
         total = float((over**2).sum()) / _ROOM**2
         change.q += 2.0 * share * over / _ROOM**2
+        total += self._velocity(rows, change, share)
         out = []
-        for name, x in (("velocity", rows.dq), ("acceleration", ddq), ("jerk", jerk)):
+        for name, x in (("acceleration", ddq), ("jerk", jerk)):
             value, slope = _hinge(x, self._most[name])
             total += value
             out.append(share * slope)
-        change.dq += out[0]
         total += self._torque(rows, change, share) + self._speed(rows, change, share)
         total += self._clearance(rows, change, share)
-        return PenaltyValue(total / N, out[1], out[2])
+        return PenaltyValue(total / N, *out)
+
+    def _velocity(self, rows: MotionRows, change: RowAdjoint, share: float) -> float:
+        if self.constraints.arm.limits.ends is None:
+            value, slope = _hinge(rows.dq, self._most["velocity"])
+            change.dq += share * slope
+            return value
+        # v(q), and its slope with q; a part of the limit stays where none is left, so that there is a way back
+        least = _LEFT * self._most["velocity"]
+
+        def most(q: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.maximum(_TIGHT * self.constraints.fastest(q, rows.dq), least)
+
+        here = most(rows.q)
+        value, slope = _hinge(rows.dq, here)
+        change.dq += share * slope
+        steeper = (most(rows.q + _STEP) - most(rows.q - _STEP)) / (2.0 * _STEP)
+        change.q -= share * slope * rows.dq / here * steeper
+        return value
 
     def _torque(self, rows: MotionRows, change: RowAdjoint, share: float) -> float:
         corners, links, step = self.constraints.corners, self._links, rows.step

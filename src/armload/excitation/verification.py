@@ -49,14 +49,19 @@ def used(constraints: Constraints, motion: Motion, rate: float = RATE) -> list[U
     q = motion(t)[0]
     dq, ddq, jerk = (np.diff(q, k, axis=0) / h**k for k in (1, 2, 3))
     out = [*_positions(constraints, t, q)]
-    for name, x in (("velocity", dq), ("acceleration", ddq), ("jerk", jerk)):
-        out += _joints(constraints, name, t, x)
+    fastest = constraints.fastest((q[1:] + q[:-1]) / 2.0, dq)
+    for name, x, most in (
+        ("velocity", dq, np.maximum(fastest, _EXACT)),
+        ("acceleration", ddq, constraints.most["acceleration"]),
+        ("jerk", jerk, constraints.most["jerk"]),
+    ):
+        out += _joints(constraints, name, t, x, most)
     rates = np.gradient(q, h, axis=0)
     rates[[0, -1]] = 0.0
     pushes = np.concatenate([ddq[:1], ddq, ddq[-1:]])
     Y = payload_regressor(arm.frame_motion(q), rates, pushes)  # (N, n, 10)
     torque = arm.torque(q, rates, pushes)[:, :, None] + Y @ constraints.corners.T
-    out += _joints(constraints, "torque", t, np.abs(torque).max(axis=2))
+    out += _joints(constraints, "torque", t, np.abs(torque).max(axis=2), constraints.most["torque"])
     place = arm.frame_pose(q)[1]
     speed = np.linalg.norm(np.diff(place, axis=0), axis=1) / h
     k = int(speed.argmax())
@@ -92,16 +97,19 @@ def _positions(constraints: Constraints, t: NDArray, q: NDArray) -> list[Used]:
     return out
 
 
-def _joints(constraints: Constraints, what: str, t: NDArray, x: NDArray) -> list[Used]:
-    out, most, whose, slides = [], constraints.most[what], constraints.whose(what), constraints.arm.limits.slides
+def _joints(constraints: Constraints, what: str, t: NDArray, x: NDArray, most: NDArray) -> list[Used]:
+    """most: what is allowed of x (N, n), (n,) or at each sample (N, n)."""
+    out, whose, slides = [], constraints.whose(what), constraints.arm.limits.slides
+    most = np.broadcast_to(most, x.shape)
+    shares = np.abs(x) / most
     for j, name in enumerate(constraints.arm.joint_names):
-        k = int(np.abs(x[:, j]).argmax())
+        k = int(shares[:, j].argmax())
         size, unit = abs(float(x[k, j])), unit_of(what, slides[j])
         text = (
             f"{name} has {called(what, slides[j])} {size:.4g} {unit} at t = {t[k]:.2f} s, "
-            f"{most[j]:.4g} {unit} are allowed ({constraints.share:g} of {whose[j]})"
+            f"{most[k, j]:.4g} {unit} are allowed ({constraints.share:g} of {whose[j]})"
         )
-        out.append(Used(what, name, size / float(most[j]), float(t[k]), text))
+        out.append(Used(what, name, float(shares[k, j]), float(t[k]), text))
     return out
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import PAYLOAD_REACH, Arm
+from armload.arms.limits import Limits
 from armload.arms.units import QUANTITIES, called, heading, marked, unit_of
 from armload.errors import MotionError
 from armload.inertia import InertialParameters
@@ -116,7 +117,7 @@ def check_motion(
     limits = arm.limits
     values = {"velocity": dq, "acceleration": ddq, "jerk": jerk, "torque": torque}
     allowed = {
-        "velocity": limits.velocity,
+        "velocity": limits.velocity_at(q, dq),
         "acceleration": limits.acceleration,
         "jerk": limits.jerk,
         "torque": limits.effort,
@@ -130,16 +131,16 @@ def check_motion(
         if room[k, j] < 0
     ]
     for name, value in values.items():
-        size, limit = np.abs(value), allowed[name]
+        size, limit = np.abs(value), np.broadcast_to(allowed[name], value.shape)
         units = [unit_of(name, slides) for slides in limits.slides]
-        at = size.argmax(axis=0)
+        room = limit - size
         peak[name] = size.max(axis=0)
-        margin[name] = limit - peak[name]
+        margin[name] = room.min(axis=0)
         problems += [
-            f"{arm.joint_names[j]} passes its {called(name, limits.slides[j])} limit of {limit[j]:.4g} {units[j]} with "
-            f"{size[k, j]:.4g} {units[j]} at t = {t[k]:.2f} s"
-            for j, k in enumerate(at)
-            if size[k, j] > limit[j]
+            f"{arm.joint_names[j]} passes its {called(name, limits.slides[j])} limit of {limit[k, j]:.4g} {units[j]}"
+            f"{_near_end(limits, name, j, limit[k, j], q[k, j])} with {size[k, j]:.4g} {units[j]} at t = {t[k]:.2f} s"
+            for j, k in enumerate(room.argmin(axis=0))
+            if room[k, j] < 0
         ]
     problems += _jumps(arm, t, dq, ddq)
 
@@ -164,6 +165,13 @@ def check_motion(
         problems,
         limits.slides,
     )
+
+
+def _near_end(limits: Limits, name: str, joint: int, limit: float, q: float) -> str:
+    """Where a limit of velocity is one of the place."""
+    if name != "velocity" or limit >= limits.velocity[joint]:
+        return ""
+    return f" at {q:.4g} {unit_of('position', limits.slides[joint])}, near the end of its range,"
 
 
 def check_joints(motion: Motion, arm: Arm) -> None:

@@ -78,7 +78,7 @@ def allowed(arm: Arm, samples: int = 90) -> Callable[[FourierMotion], bool]:
         if (
             np.any(np.abs(q - motion.offset) > TRAVEL)
             or np.any(np.minimum(q - limits.position_low, limits.position_high - q) < KEEP_OFF)
-            or np.any(np.abs(dq) > SHARE * limits.velocity)
+            or np.any(np.abs(dq) > SHARE * limits.velocity_at(q, dq))
             or np.any(np.abs(ddq) > SHARE * limits.acceleration)
             or np.any(np.abs(motion.jerk(t)) > SHARE * limits.jerk)
         ):

@@ -124,6 +124,7 @@ def filled_limits(limits: Limits) -> Limits:
         acceleration,
         jerk,
         limits.slides,
+        limits.ends,
     )
 
 

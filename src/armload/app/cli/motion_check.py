@@ -123,7 +123,7 @@ def passed(log: Recording, arm: Arm) -> list[str]:
     limits = arm.limits
     beyond = {
         "position": (np.maximum(limits.position_low - log.q, log.q - limits.position_high), log.q),
-        "velocity": (np.abs(log.dq) - limits.velocity, log.dq),
+        "velocity": (np.abs(log.dq) - limits.velocity_at(log.q, log.dq), log.dq),
     }
     return [
         f"{arm.joint_names[j]} passes its {name} limit by {over[k, j]:.3g} {unit_of(name, limits.slides[j])} at "
@@ -141,7 +141,7 @@ def print_passed(log: Recording, arm: Arm, problems: list[str]) -> None:
     from armload.arms.units import heading, marked
 
     room = np.minimum(log.q - arm.limits.position_low, arm.limits.position_high - log.q).min(axis=0)
-    speed = arm.limits.velocity - np.abs(log.dq).max(axis=0)
+    speed = (arm.limits.velocity_at(log.q, log.dq) - np.abs(log.dq)).min(axis=0)
     rows = table(
         f"{log.source} on {arm.name}, {log.duration:.2f} s: what was left to each limit, as measured",
         "joint",

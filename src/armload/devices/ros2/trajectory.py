@@ -184,7 +184,7 @@ def _check_limits(arm: Arm, motion: TrajectoryMotion) -> None:
     limits = arm.limits
     for what, over in (
         ("position", np.maximum(limits.position_low - q, q - limits.position_high)),
-        ("velocity", np.abs(dq) - limits.velocity),
+        ("velocity", np.abs(dq) - limits.velocity_at(q, dq)),
     ):
         k, j = np.unravel_index(np.argmax(over), over.shape)
         if over[k, j] > _SLACK:
