@@ -20,7 +20,8 @@ table of docs/hybrid_measured.md, after every case; half an hour of one core.
 With --again, cases are answered with other seeds, to tell chance from fault: how many values are covered or said, with
 Clopper–Pearson intervals (95 %) that take each value, or each log only, for an answer of its own, as the values of a
 log are correlated; all, and those where something is held at the end. *held throughout* are logs of *taken up or put
-down* where something is taken up, but with it held from the start. Cases that are named replace their own in
+down* where something is taken up, but with it held from the start. Two limits are asked so, too: *a part slips by 4 cm*
+and *torques hold 2 % of their neighbours'*. Cases that are named replace their own in
 benchmarks/results/wrong_logs_again.json, which is of the Panda.
 """
 
@@ -35,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 from script import RESULTS, ROOT, cases_of, markdown_table, options, say, write, write_table
-from wrong_cases import CASES, CONTROLS, PANDAS, Wrong
+from wrong_cases import CASES, CONTROLS, LIMITS, PANDAS, Wrong
 
 from armload import Arm, arm, identify
 from armload.errors import RecordingError
@@ -114,7 +115,7 @@ def between(held: float, of: int) -> list[float]:
 def again(name: str, logs: int, seeds: list[int]) -> dict[str, Any]:
     """A case with several seeds, and how sure its shares are."""
     panda, fine, held = arm("panda"), [], []
-    for log in (log for seed in seeds for log in (CASES | CONTROLS)[name]("panda", logs, seed)):
+    for log in (log for seed in seeds for log in (CASES | CONTROLS | LIMITS)[name]("panda", logs, seed)):
         answer = identify(log.run, panda, tare=log.tare, profile=log.profile)
         inside = (log.truth >= answer.phi_low) & (log.truth <= answer.phi_high)
         fine.append(inside | (answer.interval != "calibrated"))

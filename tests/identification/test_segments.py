@@ -15,7 +15,7 @@ from armload.devices import Simulator
 from armload.errors import IdentificationError
 from armload.identification import identify
 from armload.identification.added_mass import MASS_MAY_CHANGE, of_mass
-from armload.identification.notes import MAY_CHANGE
+from armload.identification.notes import MAY_CHANGE, SHIFTS
 from armload.identification.segments import changes_of_payload
 from armload.identification.tare_age import DAY, SESSION, drift_after, drift_since, in_words
 from armload.identification.thresholds import PAYLOAD_CHANGED, PAYLOAD_MAY_CHANGE
@@ -221,6 +221,36 @@ def test_no_change_is_found_in_windows_of_a_real_pair_of_motor_currents(real_dat
     for start in (6.0, 18.0, 24.0, 48.0):
         part = log.between(log.t[0] + start, log.t[0] + start + 6.0)
         assert not changes_of_payload(part, robot, tare, kappa=1.0).doubted  # kappa is not believed
+
+
+def moving_on(panda, held):
+    """A log of 6 s, and its tare."""
+    how = {"world": World.real_like(panda, 907), "sensors": Sensors.panda(panda), "rate": 100.0}
+    log = simulate_inverse(panda, taie2024(), held, seed=7, **how)
+    return identify(log, panda, tare=simulate_inverse(panda, random_motion(panda, 8), seed=8, **how))
+
+
+def test_a_payload_that_slips_slowly_is_called_approximate_in_all_its_parts(panda, payload):
+    """Each part takes it for rigid, at a place where it was for a moment only."""
+    body = InertialParameters(4.0 * payload.parameters.phi, payload.parameters.frame)
+    slips = [
+        (t, InertialParameters.from_com(body.mass, body.com + np.array([x, 0.0, 0.0]), body.inertia_com, body.frame))
+        for t, x in zip(np.linspace(1.0, 6.0, 51), np.linspace(0.0, 0.05, 51), strict=True)
+    ]
+    found = moving_on(panda, [(0.0, body), *slips])
+    assert len(found.segments) > 1
+    assert not (found.phi_low[1] <= slips[-1][1].phi[1] <= found.phi_high[1])  # where it is at the end
+    assert found.interval == "approximate"
+    assert found.notes[0] == SHIFTS
+    assert {part.answer.interval for part in found.segments} == {"approximate"}
+
+
+def test_what_is_added_to_a_payload_or_taken_off_is_no_shift(panda, payload):
+    half = InertialParameters(0.5 * payload.parameters.phi, payload.parameters.frame)
+    found = moving_on(panda, [(0.0, half), (3.0, payload)])
+    assert len(found.segments) == 2
+    assert SHIFTS not in found.notes
+    assert found.interval == "calibrated"
 
 
 def test_the_mass_of_what_was_added_is_chi_squared_of_one_where_nothing_was():

@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from armload.arms import Arm
@@ -25,6 +26,7 @@ from armload.identification.notes import (
     MANY_POSES,
     MAY_CHANGE,
     MOTOR_PROFILE,
+    SHIFTS,
     UNCHECKED,
     changed_within,
     learned_from,
@@ -185,6 +187,8 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
         answers = [answer_of_one_payload(part, arm, of_part) for part, of_part in zip(parts, of_parts, strict=True)]
         if _moves_in_parts(whole, answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
+        else:
+            answers = _doubted_where_it_shifts(answers)
     if changes.drift is not None:
         answers = [
             _doubted(answer, torques_drift(arm, changes.drift.joint, changes.drift.torque, len(answers)))
@@ -212,6 +216,24 @@ def _moves_in_parts(whole: Identification, parts: Sequence[Identification]) -> b
 def _weigh_otherwise(before: Identification, after: Identification) -> bool:
     apart = max(before.phi_low[0] - after.phi_high[0], after.phi_low[0] - before.phi_high[0])
     return apart > SWAYS * max(abs(before.mass), abs(after.mass))
+
+
+def _doubted_where_it_shifts(parts: Sequence[Identification]) -> list[Identification]:
+    """The answers of the parts, doubted on both sides of a change that took nothing up and put nothing down.
+
+    A cut takes it for a step between two rigid bodies. What shifts may do so all the time.
+    """
+    shifts = [_weigh_the_same(before, after) for before, after in pairwise(parts)]
+    return [
+        _doubted(part, SHIFTS) if before or after else part
+        for part, before, after in zip(parts, [False, *shifts], [*shifts, False], strict=True)
+    ]
+
+
+def _weigh_the_same(before: Identification, after: Identification) -> bool:
+    """Whether something is held on both sides of a change, and its mass the same within the 95 % interval."""
+    halves = [0.5 * (part.phi_high[0] - part.phi_low[0]) for part in (before, after)]
+    return before.held and after.held and abs(after.mass - before.mass) <= float(np.hypot(*halves))
 
 
 def _doubted(answer: Identification, note: str) -> Identification:

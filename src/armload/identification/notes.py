@@ -39,6 +39,13 @@ MAY_CHANGE = (
 )
 
 
+SHIFTS = (
+    "what is held weighs the same before and after a change within the log, as far as it tells: it shifts, as a part "
+    "does that slips or a gripper that opens, at once or slowly, or the arm's base moves; the answer takes it for "
+    "rigid in each part: hold it tighter, and record it once more"
+)
+
+
 def torques_drift(arm: Arm, joint: int, torque: float, parts: int) -> str:
     """That the torques drift within a log of so many parts, most of all that of a joint, from 1, by `torque`."""
     where = "the log" if parts == 1 else "a part of the log"
