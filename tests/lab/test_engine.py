@@ -10,6 +10,7 @@ import threading
 import time
 
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 from armload.errors import ClusterError
 from armload.lab.engine import Engine, engine
@@ -58,6 +59,19 @@ def test_processes_leave_ctrl_c_to_the_one_that_began_them_and_end_before_it(nam
     for process in found:
         with pytest.raises(ProcessLookupError):
             os.kill(process, 0)
+
+
+def test_processes_end_without_a_word_where_a_task_was_given_out_just_before(monkeypatch):
+    """The thread of joblib's pool looks for it among those that were cancelled meanwhile."""
+    said: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", said.append)
+    for _ in range(8):  # without the mend every third ends so
+        with engine(2):
+            pool = get_reusable_executor(max_workers=2)
+            pool.submit(time.sleep, 60.0)
+            time.sleep(0.3)  # until that is taken, and the thread waits
+            pool.submit(time.sleep, 60.0)
+    assert said == []
 
 
 SLEEPY = """

@@ -54,10 +54,15 @@ _LIKELIEST = 2  # cuts of which T is found with the whole model
 
 
 class Statistics(NamedTuple):
-    """T of a cut, and chi-squared of the mass alone; 0 where that is not tested."""
+    """T of a cut, and chi-squared of the mass alone; 0 where that is not tested.
+
+    added, std: mass that the part after the cut holds beyond the one before, and its standard deviation [kg].
+    """
 
     T: float
     of_mass: float
+    added: float = 0.0
+    std: float = np.inf
 
     @property
     def doubt(self) -> float:
@@ -226,10 +231,11 @@ class Cuts:
         """T, and the statistic of the mass alone, of what a cut's two sides say."""
         P = np.linalg.inv(information + np.diag(self.weak**-2.0))  # there are directions that neither part tells
         added = P @ vector
-        T = float(added @ np.linalg.solve(self.kappa * P + self.lost, added))
+        covariance = self.kappa * P + self.lost
+        T, mass = float(added @ np.linalg.solve(covariance, added)), (float(added[0]), float(np.sqrt(covariance[0, 0])))
         if self.physics.arm.motor_torque or not self.whole.known:
-            return Statistics(T, 0.0)  # friction that grows with the load differs from part to part as a weight does
-        return Statistics(T, of_mass(information / self.kappa, vector / self.kappa))
+            return Statistics(T, 0.0, *mass)  # friction that grows with the load differs as a weight does
+        return Statistics(T, of_mass(information / self.kappa, vector / self.kappa), *mass)
 
 
 def _without_payload(runs: Sequence[RegressionData], arm: Arm, start: Scales | None) -> list[RegressionData]:

@@ -9,7 +9,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from armload.arms import Arm
@@ -188,7 +187,7 @@ def _account(recording: Recording, arm: Arm, question: Question) -> _Account:
         if _moves_in_parts(whole, answers):
             edges, answers = [edges[0], edges[-1]], [whole]  # there is no rigid body in the parts either: it swings
         else:
-            answers = _doubted_where_it_shifts(answers)
+            answers = _doubted_where_it_shifts(answers, changes.added)
     if changes.drift is not None:
         answers = [
             _doubted(answer, torques_drift(arm, changes.drift.joint, changes.drift.torque, len(answers)))
@@ -218,22 +217,23 @@ def _weigh_otherwise(before: Identification, after: Identification) -> bool:
     return apart > SWAYS * max(abs(before.mass), abs(after.mass))
 
 
-def _doubted_where_it_shifts(parts: Sequence[Identification]) -> list[Identification]:
+def _doubted_where_it_shifts(
+    parts: Sequence[Identification], added: Sequence[tuple[float, float] | None]
+) -> list[Identification]:
     """The answers of the parts, doubted on both sides of a change that took nothing up and put nothing down.
 
-    A cut takes it for a step between two rigid bodies. What shifts may do so all the time.
+    A cut takes it for a step between two rigid bodies. What shifts may do so all the time. `added`: of each change, the
+    mass that it adds and the standard deviation of that, in which the arm's own errors cancel. Where something else is
+    doubted, as a joint's sign, that may be what looks like a shift.
     """
-    shifts = [_weigh_the_same(before, after) for before, after in pairwise(parts)]
+    shifts = [
+        mass is not None and before.held and after.held and abs(mass[0]) <= Z95 * mass[1]
+        for (before, after), mass in zip(pairwise(parts), added, strict=True)
+    ]
     return [
-        _doubted(part, SHIFTS) if before or after else part
+        _doubted(part, SHIFTS) if (before or after) and not part.doubts else part
         for part, before, after in zip(parts, [False, *shifts], [*shifts, False], strict=True)
     ]
-
-
-def _weigh_the_same(before: Identification, after: Identification) -> bool:
-    """Whether something is held on both sides of a change, and its mass the same within the 95 % interval."""
-    halves = [0.5 * (part.phi_high[0] - part.phi_low[0]) for part in (before, after)]
-    return before.held and after.held and abs(after.mass - before.mass) <= float(np.hypot(*halves))
 
 
 def _doubted(answer: Identification, note: str) -> Identification:

@@ -41,8 +41,8 @@ MAY_CHANGE = (
 
 SHIFTS = (
     "what is held weighs the same before and after a change within the log, as far as it tells: it shifts, as a part "
-    "does that slips or a gripper that opens, at once or slowly, or the arm's base moves; the answer takes it for "
-    "rigid in each part: hold it tighter, and record it once more"
+    "does that slips or a gripper that opens, at once or slowly, or the arm's base moves, or it was exchanged; the "
+    "answer takes it for rigid in each part: if it may shift, hold it tighter, and record it once more"
 )
 
 

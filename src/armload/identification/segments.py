@@ -11,9 +11,10 @@ between those changes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +50,8 @@ class Changes(NamedTuple):
 
     of_mass: the largest chi-squared of the mass alone; 0 where not tested. left: as `doubt`, but with noise that is no
     more than its blocks show: below 1 nothing is left to be explained. drift: of the torques, the surest of any part;
-    None where there is none.
+    None where there is none. added: of each change the mass that it adds and the standard deviation of that [kg]; None
+    for one while the arm stands.
     """
 
     times: list[float]
@@ -57,6 +59,7 @@ class Changes(NamedTuple):
     of_mass: float = 0.0
     left: float = 0.0
     drift: TorqueDrift | None = None
+    added: Sequence[tuple[float, float] | None] = ()
 
     @property
     def doubt(self) -> float:
@@ -145,9 +148,12 @@ class _Search:
         stops = [*np.searchsorted(t, np.array(times) - SETTLED).tolist(), len(t)]
         parts = [self.within(start, stop) for start, stop in zip(starts, stops, strict=True)]
         statistic = max(PAYLOAD_CHANGED if seen else 0.0, *(part.statistic for part in parts))
-        times = sorted([*times, *(time for part in parts for time in part.times)])
+        found = [*zip(times, [None] * len(times), strict=True)]
+        found += [both for part in parts for both in zip(part.times, part.added, strict=True)]
+        times, added = [*zip(*sorted(found, key=itemgetter(0)), strict=True)] or ((), ())
         of_mass, left = max(part.of_mass for part in parts), max(part.left for part in parts)
-        return Changes(times, statistic, of_mass, max(left, Statistics(statistic, of_mass).doubt), _surest(parts))
+        left = max(left, Statistics(statistic, of_mass).doubt)
+        return Changes(list(times), statistic, of_mass, left, _surest(parts), added)
 
     def at_rest(self) -> list[float]:
         """When the payload changes while the arm stands."""
@@ -166,9 +172,11 @@ class _Search:
             return Changes([], 0.0)
         best, most, of_mass, left = self.cuts.likeliest(start, stop, candidates)
         near = most > _NOWHERE_NEAR
+        here = None
         if near:
             best = self._finer(start, stop, candidates, best)
-            most = max(most, self.cuts.at(start, stop, best).T)
+            here = self.cuts.at(start, stop, best)
+            most = max(most, here.T)
         drift = self.cuts.drift(start, stop, best)
         if most <= PAYLOAD_CHANGED or drift.explains:
             left = max(left, self.cuts.at(start, stop, best, SMOOTH).doubt) if near else left
@@ -178,7 +186,8 @@ class _Search:
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
         parts = earlier, later = self.within(start, until), self.within(after, stop)
         times = [*earlier.times, float(t[best]) - 1.0 / GAIN, *later.times]
-        return Changes(times, most, of_mass, left, _surest(parts))
+        added = [*earlier.added, None if here is None else (here.added, here.std), *later.added]
+        return Changes(times, most, of_mass, left, _surest(parts), added)
 
     def _finer(self, start: int, stop: int, cuts: NDArray[np.int64], best: int) -> int:
         """The likeliest cut near the best of some."""

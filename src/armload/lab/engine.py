@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import logging
 import os
+import queue
 import re
 import sys
 import threading
@@ -245,9 +246,15 @@ def _gone() -> Iterator[None]:
 def _end_processes() -> None:
     """End the processes of joblib: left to the end of Python, an interruption meanwhile would be a traceback."""
     loky = sys.modules.get("joblib.externals.loky.reusable_executor")  # to ask it for its pool would make one
-    pool = getattr(loky, "_executor", None)
-    if pool is not None:
-        pool.shutdown(kill_workers=True)
+    pool: Any = getattr(loky, "_executor", None)
+    if pool is None:
+        return
+    with suppress(
+        queue.Empty
+    ):  # what still waits to be given out: a KeyError there would be printed with its traceback
+        while True:
+            pool._work_ids.get(block=False)
+    pool.shutdown(kill_workers=True)
 
 
 def _with_item(work: Callable[[T], R], item: T) -> tuple[T, R]:
