@@ -301,6 +301,7 @@ def test_an_arm_that_is_pressed_upwards_with_what_was_on_at_its_tare_still_holds
     assert events == []
     assert all(covers(e, 0.0)[0] for e in during)
     assert np.median([e.p_contact for e in during]) > 0.99
+    assert "samples that do not fit are left out: something may be touching the arm" in during[-1].notes
     assert not any(e.interval == "calibrated" for e in during)
     assert covers(estimates[-1], 0.0)[0]
 

@@ -27,7 +27,7 @@ _STANDING = "standing: nothing new is learned until the arm moves, or what it ho
 _STANDING_MOTOR = "standing: a change of payload is noticed only when the arm moves"
 _SLOW_MOTOR = "too slow: friction hides a change of payload until a joint moves faster"
 _CHANGING = "the payload is changing"
-_LEFT_OUT = "samples that do not fit are left out: something pulls at the arm, or the payload is changing"
+_LEFT_OUT = "samples that do not fit are left out: "  # and the likeliest of `_MAYBE`
 _LIFTED = "something lifts the arm, or what was on it from the start was taken off, which is believed after a minute"
 _MAYBE = (  # of p_change, p_contact and p_drift, the largest while they are large
     "the payload may be changing",
@@ -139,12 +139,14 @@ class Judgement:
 
     def left_out(self, watch: PayloadWatch) -> None:
         """Say that samples are left out."""
-        self.notes += (_CHANGING if watch.settling else _LIFTED if watch.lifted else _LEFT_OUT,)
+        why = _LEFT_OUT + _MAYBE[int(np.argmax(watch.likely))]
+        self.notes += (_CHANGING if watch.settling else _LIFTED if watch.lifted else why,)
 
     def words(self, unsure: PayloadWatch | None, blind: bool, moving: bool) -> tuple[str, ...]:
         """The notes, and what the last rows may be, if the watch is not sure of them."""
         notes = self.notes
-        if unsure is not None and not {_CHANGING, _LEFT_OUT, _LIFTED} & set(notes):
+        said = any(note in (_CHANGING, _LIFTED) or note.startswith(_LEFT_OUT) for note in notes)
+        if unsure is not None and not said:
             notes += (_MAYBE[int(np.argmax(unsure.likely))],)
         if blind and _STANDING_MOTOR not in self.notes:
             notes += (_SLOW_MOTOR if moving else _STANDING_MOTOR,)
