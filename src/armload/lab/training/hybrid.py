@@ -158,7 +158,8 @@ def episode_records(
 def _key(arm: Arm, population: str, seed: int, first: int, count: int) -> str:
     """Of everything that a chunk's records depend on."""
     facts = (arm.fingerprint, arm.known_as, arm.rated_payload, arm.link_spread, arm.motor_torque)
-    limits = [np.nan_to_num(column, posinf=1e9, neginf=-1e9).tolist() for column in astuple(arm.limits)]
+    known = (column for column in astuple(arm.limits) if column is not None)  # an arm without ends keeps its key
+    limits = [np.nan_to_num(column, posinf=1e9, neginf=-1e9).tolist() for column in known]
     recipe = asdict(POPULATIONS[population]) if population in POPULATIONS else population
     return key_of(__version__, facts, limits, recipe, seed, first, count, TIMES, TRAITS)
 
