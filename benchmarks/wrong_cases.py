@@ -172,6 +172,11 @@ def crosstalk(share: float, log: Recording, rng: np.random.Generator) -> Recordi
     return replace(log, tau=log.tau + shares[0] * before + shares[1] * after)
 
 
+def misaligned(off: float, log: Recording, rng: np.random.Generator) -> Recording:
+    """Each encoder's zero is off by so much [rad], 1 sigma."""
+    return replace(log, q=log.q + off * rng.normal(size=log.n))
+
+
 # ---------------------------------------------------------------------- the payload
 
 
@@ -408,4 +413,6 @@ CONTROLS: dict[str, Callable[[str, int, int], Iterator[Wrong]]] = {
 LIMITS: dict[str, Callable[[str, int, int], Iterator[Wrong]]] = {
     "a part slips by 4 cm": partial(slipped, 0.04),
     "torques hold 2 % of their neighbours'": partial(logged, partial(crosstalk, 0.02)),
+    "encoders' zeros off by 2 mrad": partial(logged, partial(misaligned, 2e-3)),
+    "encoders' zeros off by 10 mrad": partial(logged, partial(misaligned, 1e-2)),
 }

@@ -20,9 +20,9 @@ table of docs/hybrid_measured.md, after every case; half an hour of one core.
 With --again, cases are answered with other seeds, to tell chance from fault: how many values are covered or said, with
 Clopper–Pearson intervals (95 %) that take each value, or each log only, for an answer of its own, as the values of a
 log are correlated; all, and those where something is held at the end. *held throughout* are logs of *taken up or put
-down* where something is taken up, but with it held from the start. Two limits are asked so, too: *a part slips by 4 cm*
-and *torques hold 2 % of their neighbours'*. Cases that are named replace their own in
-benchmarks/results/wrong_logs_again.json, which is of the Panda.
+down* where something is taken up, but with it held from the start. `wrong_cases.LIMITS` are asked so, too: what nothing
+in a log tells. Cases that are named replace their own in benchmarks/results/wrong_logs_again.json, which is of the
+Panda.
 """
 
 from __future__ import annotations
