@@ -5,9 +5,10 @@ import importlib
 
 import pytest
 
-from armload.app.cli.arguments import attach_values, centre, gravity, weighed
+from armload.app.cli.arguments import centre, gravity, weighed
 from armload.app.cli.entry import COMMANDS, main
 from armload.app.cli.motion_arguments import box, floor, numbers
+from armload.app.cli.parser import attach_values
 
 OF_NUMBERS = (box, centre, floor, gravity, numbers, weighed)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armload.arms import Arm, payload_regressor
+from armload.arms.limits import Limits
 from armload.arms.units import heading, unit_of
 from armload.errors import MotionError
 from armload.excitation.payload_range import PayloadRange
@@ -99,17 +100,16 @@ class Constraints:
     @cached_property
     def most(self) -> dict[str, NDArray[np.float64]]:
         """By quantity, the largest magnitude (n,) of velocity, acceleration, jerk and torque."""
-        filled = filled_limits(self.arm.limits)
         return {
-            "velocity": self.share * filled.velocity,
-            "acceleration": self._beside_path("acceleration", self.share * filled.acceleration),
-            "jerk": self._beside_path("jerk", self.share * filled.jerk),
+            "velocity": self.share * self._limits.velocity,
+            "acceleration": self._beside_path("acceleration", self.share * self._limits.acceleration),
+            "jerk": self._beside_path("jerk", self.share * self._limits.jerk),
             "torque": self.share * self.arm.limits.effort,
         }
 
     def fastest(self, q: NDArray[np.float64], dq: NDArray[np.float64]) -> NDArray[np.float64]:
         """The largest speed (N, n) at positions q (N, n) in the sense of velocities dq (N, n): less near the ends."""
-        return self.share * filled_limits(self.arm.limits).velocity_at(q, dq)
+        return self.share * self._limits.velocity_at(q, dq)
 
     def whose(self, what: str) -> list[str]:
         """Of each joint, what a limit is a share of, in words: its own limit, or one that is assumed."""
@@ -117,7 +117,7 @@ class Constraints:
             return ["its limit"] * self.arm.n
         assumed = "what is assumed, as its maker gives no limit"
         given = np.isfinite(getattr(self.arm.limits, what))
-        wider = self._wider(what, self.share * getattr(filled_limits(self.arm.limits), what))
+        wider = self._wider(what, self.share * getattr(self._limits, what))
         return [
             "its limit" if limit else f"{assumed}, beside what the path itself uses" if more else assumed
             for limit, more in zip(given, wider, strict=True)
@@ -131,6 +131,10 @@ class Constraints:
 
     def _beside_path(self, what: str, most: NDArray[np.float64]) -> NDArray[np.float64]:
         return most if self.path_uses is None else np.where(self._wider(what, most), self.path_uses[what] + most, most)
+
+    @cached_property
+    def _limits(self) -> Limits:
+        return filled_limits(self.arm.limits)
 
     @cached_property
     def corners(self) -> NDArray[np.float64]:

@@ -79,11 +79,7 @@ class Penalty:
         return PenaltyValue(total / N, *out)
 
     def _velocity(self, rows: MotionRows, change: RowAdjoint, share: float) -> float:
-        if self.constraints.arm.limits.ends is None:
-            value, slope = _hinge(rows.dq, self._most["velocity"])
-            change.dq += share * slope
-            return value
-        # v(q), and its slope with q; a part of the limit stays where none is left, so that there is a way back
+        # v(q), and its slope with q where it has one; a part stays where nothing is left, so that there is a way back
         least = _LEFT * self._most["velocity"]
 
         def most(q: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,6 +88,8 @@ class Penalty:
         here = most(rows.q)
         value, slope = _hinge(rows.dq, here)
         change.dq += share * slope
+        if self.constraints.arm.limits.ends is None:
+            return value
         steeper = (most(rows.q + _STEP) - most(rows.q - _STEP)) / (2.0 * _STEP)
         change.q -= share * slope * rows.dq / here * steeper
         return value

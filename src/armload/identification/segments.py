@@ -186,7 +186,8 @@ class _Search:
         until, after = (int(np.searchsorted(t, t[best] + aside)) for aside in (-SETTLED, SETTLED))
         parts = earlier, later = self.within(start, until), self.within(after, stop)
         times = [*earlier.times, float(t[best]) - 1.0 / GAIN, *later.times]
-        added = [*earlier.added, None if here is None else (here.added, here.std), *later.added]
+        assert here is not None  # what is above `PAYLOAD_CHANGED` was looked at more finely
+        added = [*earlier.added, (here.added, here.std), *later.added]
         return Changes(times, most, of_mass, left, _surest(parts), added)
 
     def _finer(self, start: int, stop: int, cuts: NDArray[np.int64], best: int) -> int:

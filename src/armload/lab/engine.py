@@ -249,9 +249,7 @@ def _end_processes() -> None:
     pool: Any = getattr(loky, "_executor", None)
     if pool is None:
         return
-    with suppress(
-        queue.Empty
-    ):  # what still waits to be given out: a KeyError there would be printed with its traceback
+    with suppress(queue.Empty):  # what still waits to be given out: its thread would end by a KeyError, and print it
         while True:
             pool._work_ids.get(block=False)
     pool.shutdown(kill_workers=True)

@@ -139,15 +139,14 @@ class Judgement:
 
     def left_out(self, watch: PayloadWatch) -> None:
         """Say that samples are left out."""
-        why = _LEFT_OUT + _MAYBE[int(np.argmax(watch.likely))]
-        self.notes += (_CHANGING if watch.settling else _LIFTED if watch.lifted else why,)
+        self.notes += (_CHANGING if watch.settling else _LIFTED if watch.lifted else _LEFT_OUT + _likeliest(watch),)
 
     def words(self, unsure: PayloadWatch | None, blind: bool, moving: bool) -> tuple[str, ...]:
         """The notes, and what the last rows may be, if the watch is not sure of them."""
         notes = self.notes
         said = any(note in (_CHANGING, _LIFTED) or note.startswith(_LEFT_OUT) for note in notes)
         if unsure is not None and not said:
-            notes += (_MAYBE[int(np.argmax(unsure.likely))],)
+            notes += (_likeliest(unsure),)
         if blind and _STANDING_MOTOR not in self.notes:
             notes += (_SLOW_MOTOR if moving else _STANDING_MOTOR,)
         return notes
@@ -185,3 +184,8 @@ class Judgement:
         self.estimate, self.run, self.around = estimate, run, estimate.phi
         if isinstance(run, PosteriorLeastSquares):  # of no other: a run that ends is solved anew in a second thread
             self.torque_gain_std = run.stream.posterior.gain_std
+
+
+def _likeliest(watch: PayloadWatch) -> str:
+    """What the last rows may be, of what a steady arm with the same payload is not."""
+    return _MAYBE[int(np.argmax(watch.likely))]

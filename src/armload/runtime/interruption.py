@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from types import FrameType
 
+Handler = Callable[[int, FrameType | None], object]
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -32,19 +33,14 @@ def held_back() -> Iterator[Interruption]:
 
     SIGHUP is ignored where it was (nohup): the program is to outlive its terminal, also while an arm moves. The others
     are noted all the same: what a shell runs in the background ignores Ctrl-C, but whoever sends it wants the arm to
-    stop. In another thread than the main one, where signals do not come, nothing is changed.
+    stop.
     """
     interruption = Interruption()
-    if threading.current_thread() is not threading.main_thread():
-        yield interruption
-        return
     ignored = (signal.SIGHUP,) if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else ()
-    before = {number: signal.signal(number, interruption.heard) for number in _SIGNALS if number not in ignored}
     try:
-        yield interruption
+        with _handled([number for number in _SIGNALS if number not in ignored], interruption.heard):
+            yield interruption
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         if interruption.name is not None:
             raise KeyboardInterrupt
 
@@ -54,23 +50,30 @@ def put_off() -> Iterator[None]:
     """Within, what would interrupt is only noted; who handles it hears of it at the end.
 
     For compiled code with threads of its own: a Python that ends while they work ends by SIGSEGV. A signal that is
-    ignored stays so, and one that ends the process at once does. In another thread than the main one nothing is
-    changed.
+    ignored stays so, and one that ends the process at once does.
     """
+    heard: list[int] = []
+    handlers: dict[int, Handler] = {n: handler for n in _SIGNALS if callable(handler := signal.getsignal(n))}
+    try:
+        with _handled(handlers, lambda number, _: heard.append(number)):
+            yield
+    finally:
+        for number in heard:
+            handlers[number](number, None)
+
+
+@contextmanager
+def _handled(numbers: Iterable[int], handler: Handler) -> Iterator[None]:
+    """Within, a handler hears of signals; in another thread than the main one, where they do not come, nothing does."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard: list[int] = []
-    handlers = {number: handler for number in _SIGNALS if callable(handler := signal.getsignal(number))}
-    for number in handlers:
-        signal.signal(number, lambda heard_now, _: heard.append(heard_now))
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
     finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        for number in heard:
-            handlers[signal.Signals(number)](number, None)
+        for number, other in before.items():
+            signal.signal(number, other)
 
 
 @contextmanager
@@ -116,11 +119,5 @@ def _ended_by(number: signal.Signals, once: bool) -> Iterator[None]:
             signal.signal(number, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread():
+    with _handled([number], interrupt):
         yield
-        return
-    before = signal.signal(number, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(number, before)

@@ -6,7 +6,8 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, output_file, output_folder
+from armload.app.cli.arguments import add_cluster_argument, at_least, output_file, output_folder
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note, print_table
 
 _EXAMPLES = """\

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from armload.app.cli.arguments import Parser, add_arm_arguments, add_cluster_argument, at_least, output_folder
+from armload.app.cli.arguments import add_arm_arguments, add_cluster_argument, at_least, output_folder
 from armload.app.cli.named import arm_of, motion_of, payload_named, whole_number, world_of
+from armload.app.cli.parser import Parser
 from armload.app.cli.progress import progress_shown
 
 _EXAMPLES = """\

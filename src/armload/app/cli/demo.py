@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from armload.app.cli.arguments import Parser, at_least, output_folder
+from armload.app.cli.arguments import at_least, output_folder
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note, print_table
 
 _EXAMPLES = """\

@@ -29,8 +29,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
-from armload.app.cli.arguments import Parser, attach_values
 from armload.app.cli.outputs import check_outputs
+from armload.app.cli.parser import Parser, attach_values
 from armload.app.cli.printing import drop_unwritten, on_one_line, print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.extras import missing

@@ -6,9 +6,10 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, file_name, output_file
+from armload.app.cli.arguments import file_name, output_file
 from armload.app.cli.export_frame import frame_for, no_flange, on_flange
 from armload.app.cli.named import BUILT_IN, load_of, part_of
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note
 from armload.errors import ArmError, UsageError
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 
 from armload.app.cli.arguments import (
-    Parser,
     add_arm_arguments,
     add_column_arguments,
     add_identifier_arguments,
@@ -19,6 +18,7 @@ from armload.app.cli.arguments import (
 from armload.app.cli.export import FORMS, write
 from armload.app.cli.named import arm_of, payload_named
 from armload.app.cli.named_logs import read_logs, with_gravity_put_back
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_json, print_note, working, write_json
 
 _EXAMPLES = """\

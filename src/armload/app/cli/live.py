@@ -7,7 +7,6 @@ import time
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import (
-    Parser,
     add_arm_arguments,
     add_column_arguments,
     add_identifier_arguments,
@@ -24,6 +23,7 @@ from armload.app.cli.learning import learn_from
 from armload.app.cli.named import arm_of, payload_named, robot_of
 from armload.app.cli.named_logs import columns_for, columns_of, read_logs
 from armload.app.cli.outputs import check_output
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import notes_aside, print_note
 from armload.errors import ArmloadError, UsageError
 from armload.runtime.interruption import held_back

@@ -7,7 +7,6 @@ import shlex
 import shutil
 
 from armload.app.cli.arguments import (
-    Parser,
     add_arm_arguments,
     add_column_arguments,
     add_known_arguments,
@@ -18,7 +17,8 @@ from armload.app.cli.arguments import (
     output_folder,
     pace,
 )
-from armload.app.cli.motion_arguments import box, floor, numbers
+from armload.app.cli.motion_arguments import add_obstacle_arguments, numbers
+from armload.app.cli.parser import Parser
 
 _EXAMPLES = """\
 examples:
@@ -105,21 +105,7 @@ def parser() -> Parser:
     add("--grip", type=command, metavar="COMMAND", help="a command that mounts the payload; else you are asked to")
     add_column_arguments(parser)
     safety = parser.add_argument_group("what is allowed").add_argument
-    safety(
-        "--floor",
-        type=floor,
-        default=0.0,
-        metavar="Z|none",
-        help="height of the floor in the base's frame [m], or none (default: 0)",
-    )
-    safety(
-        "--box",
-        type=box,
-        action="append",
-        default=[],
-        metavar="X,Y,Z,SX,SY,SZ",
-        help="an obstacle in the base's frame [m]; repeat for more",
-    )
+    add_obstacle_arguments(safety)
     safety(
         "--approach",
         type=at_least(0.0, float),

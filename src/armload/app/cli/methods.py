@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armload.app.cli.arguments import Parser
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import console, print_json, table
 
 _EXAMPLES = """\

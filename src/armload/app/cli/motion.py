@@ -12,9 +12,10 @@ from armload.app.cli import (
     motion_export,
     motion_show,
 )
-from armload.app.cli.arguments import Parser, add_arm_arguments, at_least, output_file
+from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
 from armload.app.cli.named import arm_of
 from armload.app.cli.outputs import check_motion_file
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note, working
 
 _EXAMPLES = """\

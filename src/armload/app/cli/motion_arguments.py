@@ -1,11 +1,14 @@
-"""What `armload motion design` and `enrich` are asked: poses, boxes, joints, accuracies, limits."""
+"""What commands about motions are asked: poses, floor and boxes, joints, accuracies, limits."""
 
 from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Callable
 
 from armload.app.cli.arguments import add_arm_arguments, add_column_arguments, at_least, file_name, output_file
+
+FLOOR = 0.0  # [m] its height in the base's frame, where nothing else is said
 
 
 def numbers(text: str) -> tuple[float, ...]:
@@ -102,12 +105,24 @@ def add_constraint_arguments(
         metavar="X,Y,Z",
         help="of payloads in the payload frame, to 5 cm along each axis [m] (default: 0,0,0.1)",
     )
+    add_obstacle_arguments(add)
+    add(
+        "--held",
+        type=held,
+        metavar="R|SX,SY,SZ",
+        help="what is held: radius of a ball 0.1 m beyond the payload frame, or edges of a box that begins at it [m] "
+        "(default: 0.15)",
+    )
+
+
+def add_obstacle_arguments(add: Callable[..., object]) -> None:
+    """`--floor` and `--box`, by the `add_argument` of a parser or of a group."""
     add(
         "--floor",
         type=floor,
-        default=0.0,
-        metavar="Z",
-        help="height of the floor in the base's frame [m], or none (default: 0)",
+        default=FLOOR,
+        metavar="Z|none",
+        help=f"height of the floor in the base's frame [m], or none (default: {FLOOR:g})",
     )
     add(
         "--box",
@@ -116,13 +131,6 @@ def add_constraint_arguments(
         default=[],
         metavar="X,Y,Z,SX,SY,SZ",
         help="an obstacle in the base's frame [m]; repeat for more",
-    )
-    add(
-        "--held",
-        type=held,
-        metavar="R|SX,SY,SZ",
-        help="what is held: radius of a ball 0.1 m beyond the payload frame, or edges of a box that begins at it [m] "
-        "(default: 0.15)",
     )
 
 

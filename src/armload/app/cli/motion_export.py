@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
-from armload.app.cli.motion_arguments import box, floor, numbers
+from armload.app.cli.motion_arguments import FLOOR, add_obstacle_arguments, numbers
 from armload.app.cli.named import arm_of, boxes_of, motion_of
 from armload.app.cli.printing import print_note
 from armload.errors import MotionError, UsageError
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from armload.motion import Motion
 
 _DEFAULT = "panda"
-_FLOOR = 0.0  # [m] in the base's frame
 _LEAD = 0.5  # [s] until the first point of a ros2 trajectory from the present pose, where the arm is already
 
 
@@ -52,21 +51,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
         "--approach", type=at_least(0.0, float, 10.0), metavar="RAD", help="farthest of a joint from there (default: 1)"
     )
     add("--payload", type=at_least(0.0, float), metavar="KG", help="heaviest on the way (default: as rated)")
-    add(
-        "--floor",
-        type=floor,
-        default=_FLOOR,
-        metavar="Z",
-        help="height of the floor in the base's frame [m], or none (default: 0)",
-    )
-    add(
-        "--box",
-        type=box,
-        action="append",
-        default=[],
-        metavar="X,Y,Z,SX,SY,SZ",
-        help="an obstacle in the base's frame [m]; repeat for more",
-    )
+    add_obstacle_arguments(add)
 
 
 def run_export(options: argparse.Namespace) -> int:
@@ -80,7 +65,7 @@ def run_export(options: argparse.Namespace) -> int:
     motion, lead = motion_of(options.motion, arm, needed), {}
     if options.start is not None:
         motion, lead = _led(motion, arm, options), {"lead": _LEAD}
-    elif options.approach is not None or options.payload is not None or options.box or options.floor != _FLOOR:
+    elif options.approach is not None or options.payload is not None or options.box or options.floor != FLOOR:
         raise UsageError(
             "--approach, --payload, --floor and --box are of the way from the present pose: give it with --from"
         )

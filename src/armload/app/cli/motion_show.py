@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import add_arm_arguments, at_least, output_file
-from armload.app.cli.motion_arguments import box, floor, held
+from armload.app.cli.motion_arguments import add_obstacle_arguments, held
 from armload.app.cli.named import arm_of, motion_of, surroundings_of
 from armload.app.cli.printing import console, print_note, table
 from armload.errors import UsageError
@@ -32,21 +32,7 @@ def add_show_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("with --page").add_argument
     add("--host", metavar="H", help="interface of the page (default: 127.0.0.1)")
     add("--port", type=at_least(0, int, 65535), metavar="P", help="of the page (default: 8080, or the next free one)")
-    add(
-        "--floor",
-        type=floor,
-        default=0.0,
-        metavar="Z",
-        help="height of the floor in the base's frame [m], or none (default: 0)",
-    )
-    add(
-        "--box",
-        type=box,
-        action="append",
-        default=[],
-        metavar="X,Y,Z,SX,SY,SZ",
-        help="an obstacle in the base's frame [m]; repeat for more",
-    )
+    add_obstacle_arguments(add)
     add("--held", type=held, metavar="R|SX,SY,SZ", help="what is held, as of `motion design` (default: 0.15)")
 
 

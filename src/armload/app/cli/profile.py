@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import (
     COLUMN_OPTIONS,
-    Parser,
     add_arm_arguments,
     add_column_arguments,
     file_name,
@@ -20,6 +19,7 @@ from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, payload_named
 from armload.app.cli.named_logs import read_logs
 from armload.app.cli.outputs import contents_of, replacing_unchanged
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_json, print_note, working
 from armload.app.cli.profile_text import fields_of, in_time, of_motors, print_profile
 from armload.errors import UsageError

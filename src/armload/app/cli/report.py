@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from armload.app.cli.arguments import (
     COLUMN_OPTIONS,
-    Parser,
     add_arm_arguments,
     add_column_arguments,
     at_least,
@@ -21,6 +20,7 @@ from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, arm_of_dataset, payload_of
 from armload.app.cli.named_logs import read_logs
 from armload.app.cli.outputs import check_page
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note, print_table, working
 from armload.errors import UsageError
 

@@ -7,7 +7,8 @@ import os
 import sys
 from pathlib import Path
 
-from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, output_file, output_folder
+from armload.app.cli.arguments import add_cluster_argument, at_least, output_file, output_folder
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note
 from armload.errors import UsageError
 

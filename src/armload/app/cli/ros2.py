@@ -7,7 +7,6 @@ import time
 
 from armload.app.cli.arguments import (
     COLUMNS,
-    Parser,
     add_arm_arguments,
     add_identifier_arguments,
     add_tare_age_argument,
@@ -18,6 +17,7 @@ from armload.app.cli.arguments import (
 from armload.app.cli.idle import given, refuse_idle
 from armload.app.cli.named import arm_of, motion_of, payload_of, world_of
 from armload.app.cli.named_logs import read_logs
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note
 
 _EXAMPLES = """\

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import (
-    Parser,
     add_arm_arguments,
     add_identifier_arguments,
     add_tare_age_argument,
@@ -24,6 +23,7 @@ from armload.app.cli.arguments import (
 )
 from armload.app.cli.aside import Aside
 from armload.app.cli.named import robot_of
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import drop_unwritten, notes_aside, print_note
 from armload.errors import UsageError
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from armload.app.cli.arguments import (
     COLUMNS,
-    Parser,
     add_arm_arguments,
     add_cluster_argument,
     at_least,
@@ -16,6 +15,7 @@ from armload.app.cli.arguments import (
     output_folder,
 )
 from armload.app.cli.outputs import check_page
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import counted, print_json, print_note, working
 from armload.app.cli.progress import progress_shown
 from armload.errors import UsageError

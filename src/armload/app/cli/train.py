@@ -7,8 +7,9 @@ from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armload.app.cli.arguments import Parser, add_cluster_argument, at_least, output_file, output_folder
+from armload.app.cli.arguments import add_cluster_argument, at_least, output_file, output_folder
 from armload.app.cli.named import arm_of_dataset, motion_of
+from armload.app.cli.parser import Parser
 from armload.app.cli.printing import print_note, print_table
 from armload.app.cli.progress import training_progress
 from armload.errors import UsageError
